@@ -32,7 +32,7 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """Return the file's values of this board's calibrated parameters; empty without a file.
+    """Return this board's calibrated parameters from the file; empty if the file does not exist.
 
     Raises ParameterError for an unreadable file or a wrong value; the message names a remedy.
     """
@@ -48,7 +48,7 @@ def load(path: Path, table: Table) -> dict[str, Value]:
 
 
 def names(path: Path) -> list[str]:
-    """Return all names in the file, also those that the driver ignores; empty without a file.
+    """Return all names in the file, also ignored ones; empty if the file does not exist.
 
     Raises ParameterError if the file cannot be read.
     """

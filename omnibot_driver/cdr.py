@@ -3,7 +3,7 @@
 """Serialise measurements to CDR, the format of DDS messages, and parse velocity commands from CDR.
 
 CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write CDR quickly. At each
-start, ``difference`` compares the result with that of rclpy on this machine.
+start, ``difference`` compares these bytes with the bytes that rclpy writes on this machine.
 """
 
 import itertools
@@ -108,7 +108,7 @@ class Serializer:
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
     """Return the planar part of a serialised Twist, and whether all its other parts are zero.
 
-    Raises CommandRefused for NaN, infinity, or bytes of another type.
+    Raises CommandRefused if a value is NaN or infinite, or if the bytes are not a Twist.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)

@@ -43,8 +43,8 @@ Words = list[tuple[int, bytes]]
 def watch(stop: Words, emergency_stop: Words) -> None:
     """Watch the driver until it ends, and stop the robot if necessary.
 
-    This is necessary if the driver hangs, or if it ends without sending ``BYE``. ``BYE`` means that
-    the driver has stopped the robot itself.
+    The guard stops the robot if the driver hangs, or if the driver ends without sending ``BYE``.
+    ``BYE`` means that the driver has stopped the robot itself.
     """
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
@@ -70,7 +70,7 @@ def watch(stop: Words, emergency_stop: Words) -> None:
 
 
 def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
-    """Split the received bytes into heartbeats, the newest stop commands and an incomplete rest."""
+    """Split the received bytes into heartbeats, the newest stop commands and a partial message."""
     beats = given = b""
     while WORDS in heard:
         before, _, after = heard.partition(WORDS)

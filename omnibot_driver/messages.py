@@ -239,14 +239,14 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 def age(stamp: Time, now_ns: int) -> float:
     """Return the age of a stamp, in s. A stamp of zero has the age 0.
 
-    ``now_ns``: present time of the stamp's clock.
+    ``now_ns``: current time of the stamp's clock, in ns.
     """
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
 
 def is_stamped(stamped: TwistStamped) -> bool:
-    """Return whether the sender has set the stamp. A stamp of zero is not set."""
+    """Return whether the sender has set the stamp. Zero means that it is not set."""
     stamp = stamped.header.stamp
     return bool(stamp.sec or stamp.nanosec)
 

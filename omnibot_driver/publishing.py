@@ -37,7 +37,7 @@ byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
 """Time of a simulated clock, in ns, from which on measurements are not published. It is a minute
-less than the latest time that a stamp can express, so that a stamp can be later than the clock."""
+before the latest time that a stamp can express, so that a stamp can be later than the clock."""
 
 
 class Publishing:

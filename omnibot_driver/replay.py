@@ -65,7 +65,7 @@ class Replay:
         self._thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Call ``action`` with the session and the present time of the recording, in s."""
+        """Call ``action`` with the session and the current time of the recording, in s."""
         try:
             with self._lock:
                 try:
@@ -79,7 +79,7 @@ class Replay:
             self._outbox.deliver()
 
     unstopped: Final = False
-    """Always False, because a recording has no robot that may be moving."""
+    """Always False, because a recording does not move a robot."""
 
     @property
     def blocked(self) -> bool:

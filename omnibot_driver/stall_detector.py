@@ -37,8 +37,7 @@ class StallDetector:
 
     The pacer thread calls ``passed`` ten times a second or more, to show that it runs. Other
     threads call ``begun`` before they use the session. If ``begun`` reports a stall, the calling
-    thread must stop the robot first. The detector also works if the computer's clock is set
-    while it runs.
+    thread must stop the robot first. Setting the computer's clock does not disturb the detector.
     """
 
     def __init__(self) -> None:
@@ -64,7 +63,7 @@ class StallDetector:
     def passed(self, now: float, wall_ns: int) -> None:
         """Record that the pacer thread runs now, which ends a stall.
 
-        ``wall_ns``: the present time of day, in ns.
+        ``wall_ns``: the current time of day, in ns.
         """
         if self._begun:
             self._begun = False

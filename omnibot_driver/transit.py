@@ -20,9 +20,9 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, within a series of late messages. If all messages of a sender are late for 5
-s (``HEALS_AFTER_S``), its clock was probably set back. After a longer pause, a late message begins
-a new series."""
+"""Longest pause, in s, in a series of late messages. After a longer pause, a late message begins
+a new series. If a series lasts 5 s (``HEALS_AFTER_S``), the sender's clock was probably set back.
+"""
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
 rate."""

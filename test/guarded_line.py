@@ -2,7 +2,7 @@
 
 """Helpers for tests of the guard, the process that stops the robot if the driver cannot.
 
-They are a line in place of a board, and functions that act in place of the driver.
+The helpers are a pseudo-terminal that replaces the board, and functions that act as the driver.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ LATCHED_WORDS = b"and these under the e-stop"
 
 
 class Line:
-    """A pseudo-terminal in place of a serial line. ``near`` is the driver's port."""
+    """A pseudo-terminal that replaces the serial line. ``near`` is the end at the driver."""
 
     def __init__(self) -> None:
         self._far, self.near = os.openpty()

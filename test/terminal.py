@@ -12,9 +12,10 @@ PATIENCE_S = 60.0
 
 
 def fill(descriptor: int, words: bytes = b"x", *, full_s: float = 0.2) -> None:
-    """Write ``words`` until the non-blocking descriptor has accepted no more for ``full_s``.
+    """Write ``words`` again and again until the descriptor has accepted nothing for ``full_s``.
 
-    The kernel may make room later, so one attempt is too few.
+    The descriptor does not block. The kernel may empty a part of its buffer later, so the function
+    does not stop at the first refusal.
     """
     taken, full = 0, 0
     while full < 100 * full_s:

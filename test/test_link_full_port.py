@@ -61,7 +61,7 @@ def at_rest(terminal: Terminal) -> tuple[Link, Session]:
 def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> None:
     """The port is full while the link closes. The link does not wait for the port.
 
-    When the port has room again, the guard process writes Stop.
+    When the port accepts data again, the guard process writes Stop.
     """
     link, _ours = at_rest(terminal)
     terminal.fill()
@@ -73,7 +73,7 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
     """The port is full when the e-stop is latched. The link reports that its output is blocked.
 
-    When there is room, the link writes the e-stop first.
+    When the port accepts data again, the link writes the e-stop first.
     """
     link, _ours = at_rest(terminal)
     reader, may_open = link._reader, threading.Event()
@@ -96,7 +96,7 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
     """A defect ends the driver while its port is full. The guard process sends Stop later.
 
-    It does so as soon as there is room in the port.
+    It does so as soon as the port accepts data again.
     """
     link, ours = at_rest(terminal)
     terminal.fill()

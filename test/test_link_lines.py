@@ -84,7 +84,7 @@ class Lines:
         self.name.symlink_to(self.sense.path)
 
     def say_that_it_stands(self) -> None:
-        """Report a standstill, in place of the board, once the line is open.
+        """Wait until the line is open. Then write a report of a standstill, as the board would.
 
         Data that is sent earlier would be lost.
         """

@@ -47,9 +47,9 @@ class Held:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed: int) -> None:
-    """Six threads bring events and pause at random.
+    """Six threads put events into the outbox, with waits of random length between them.
 
-    Each event leaves once, and all leave in order.
+    Each event is delivered once, and all are delivered in order.
     """
     outbox, lock = Outbox(), threading.Lock()
     happened: list[int] = []
@@ -105,7 +105,7 @@ def test_nobody_claims_what_is_not_next() -> None:
 def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
     """One thread delivers. Another thread puts events into the outbox and returns at once.
 
-    Its events leave after the current delivery.
+    Its events are delivered after the current one.
     """
     outbox = Outbox()
     left: list[str] = []
@@ -122,7 +122,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
     """A delivery raises an error in the thread that delivers.
 
-    The events that still wait leave with the next delivery.
+    The events that still wait are delivered by the next call of ``deliver``.
     """
     outbox = Outbox()
     left: list[int] = []
@@ -140,7 +140,7 @@ def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
 
 
 def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
-    """A delivery puts an event into the outbox. That event leaves after the delivery."""
+    """A delivery puts an event into the outbox. That event is delivered next."""
     outbox = Outbox()
     left: list[int] = []
     outbox.put(lambda: outbox.put(partial(left.append, 2)) or left.append(1))

@@ -31,7 +31,7 @@ def taken(pipe: int) -> None:
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
     """The disk is full, so a line of output is lost.
 
-    When there is room again, the next line is written.
+    When the disk has space again, the next line is written.
     """
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)
@@ -112,7 +112,7 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """A standard output is closed, so its descriptor is free. An opened port does not get it.
+    """Standard streams are closed, so their descriptors are free. A port gets another descriptor.
 
     Otherwise, printed text would go to the board.
     """

@@ -195,9 +195,9 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One read contains a pause and then data frames. Meanwhile, another thread publishes "paused".
+    """In one read, the board reports a pause, then sends data. Another thread publishes "paused".
 
-    After the read, the driver publishes the state "nominal", so that later subscribers get it.
+    After the read, the driver publishes "nominal". Otherwise, later subscribers would get "paused".
     """
     session, publishing = session_with(node)
     published: list[str] = []

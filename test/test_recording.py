@@ -74,7 +74,7 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
     """A bag has two robots with two lines each. The topic of one line selects the robot.
 
-    The bytes of each line reach the right channel.
+    The bytes of each line reach the channel of this line.
     """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
@@ -170,7 +170,7 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 
 
 def test_only_its_own_urls_are_taken() -> None:
-    """Only URLs that begin with ``replay:`` are recordings. Any other name may be a device."""
+    """Only URLs that begin with ``replay:`` are recordings, not device names or other URLs."""
     assert is_recording("replay://x")
     assert not is_recording("/dev/replay")
     assert not is_recording("sim://")

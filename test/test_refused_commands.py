@@ -2,7 +2,7 @@
 
 """Tests of refused commands after the motion monitor has stopped the robot.
 
-After such a stop, motion is refused until the sender has paused or sent a zero command.
+After this stop, motion is refused until the sender was silent for a while or sent a zero command.
 """
 
 import math

@@ -38,7 +38,7 @@ class Sender:
 class Receiver:
     """The part of the driver that receives commands.
 
-    Its clock is ahead of the true time by ``ahead_s``, and its steady clock is right.
+    Its time of day is ahead of the true time by ``ahead_s``, but its steady clock is correct.
     """
 
     ahead_s: float = 0.0
@@ -97,7 +97,7 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 ) -> None:
     """A sender is silent for a while. Its next command arrives late and is refused.
 
-    The next command in time is accepted.
+    The next command that arrives in time is accepted.
     """
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):
@@ -255,7 +255,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
     """A sender's first message is 0.5 s late, so its clock seems to the driver to be behind.
 
     For the next message, the driver therefore returns two possible times of sending: the estimated
-    one, and the one by the sender's clock. Here the latter is right.
+    one, and the one by the sender's clock. Here, the sender's clock is correct.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -267,7 +267,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """After ten messages of a sender, the driver returns only one time of sending for each message.
 
-    It is right although the sender's clock is an hour behind.
+    This time is correct although the sender's clock is an hour behind.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

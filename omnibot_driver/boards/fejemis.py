@@ -83,7 +83,7 @@ def settings(values: Mapping[str, Any]) -> FejemisSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
-    """Return a function that opens both serial devices, or one if the other device is missing."""
+    """Return a function that opens both serial devices. If one is missing, it opens the other."""
     names = ("port", "front_port")
     for name in names:
         check_address(values[name], name, pollable=True)

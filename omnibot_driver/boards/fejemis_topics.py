@@ -37,8 +37,8 @@ from omnibot_driver.qos import DEEP
 NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
-"""Shortest time between two published steering angles, in ns. The board sends 66 angles a
-second."""
+"""Shortest time between two published steering angles, in ns. The board sends 66 angles per second.
+The driver does not publish those that come earlier."""
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")
 SERVICES: Final = {
@@ -273,7 +273,7 @@ def _why_not_connected(what: str, session: Session) -> str:
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
-    """Return the publisher of a topic that every board has; the driver has already created it."""
+    """Return the publisher, which already exists, of a topic that every board has."""
     name = node.resolve_topic_name(topic)
     return next(one for one in node.publishers if one.topic_name == name)
 

@@ -135,7 +135,7 @@ DRIVING: Final = (
         200,
         "",
         "Length of a record (~/record_rpm, ~/record_torque, ~/record_heading), in samples of each"
-        " wheel or in headings. The board can complete at most 1024.",
+        " wheel or in headings. The board never completes a longer record than 1024.",
         low=1,
         high=MOST_SAMPLES,
     ),
@@ -195,11 +195,11 @@ _WORDS: Final = {
     "td": "Time constant Td of the {} wheel's speed controller",
     "short_correction": (
         "The {} encoder's signal alternates between a short and a long level. The board multiplies"
-        " the measured durations of the short ones by this factor"
+        " the measured duration of each short level by this factor"
     ),
     "long_correction": (
         "The {} encoder's signal alternates between a short and a long level. The board multiplies"
-        " the measured durations of the long ones by this factor"
+        " the measured duration of each long level by this factor"
     ),
     "feed_forward": "Feed-forward of the {} wheel's speed controller",
 }

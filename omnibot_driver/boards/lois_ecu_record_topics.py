@@ -37,7 +37,7 @@ NAMES: Final = {
 class Recorder:
     """The services of one node that start records.
 
-    ``values``: function that returns the present parameter values.
+    ``values``: function that returns the current parameter values.
     ``publish``: for each type of result, the function that receives it.
     """
 

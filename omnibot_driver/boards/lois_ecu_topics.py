@@ -78,7 +78,7 @@ class LoisEcuTopics:
         self._make_what_the_modes_need()
 
     def _make_what_the_modes_need(self) -> None:
-        """Create the topics that the present modes need; remove ``duty_cmd`` outside of duty mode.
+        """Create the topics that the current modes need; remove ``duty_cmd`` outside of duty mode.
 
         The modes are the parameters ``drive_mode`` and ``terminal_mode``. This method must be
         called on the executor's thread.

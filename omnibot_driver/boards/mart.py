@@ -74,7 +74,10 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], UdpPorts]:
-    """Return a function that opens the command port, and the stop port with the next number."""
+    """Return a function that opens the command port and the stop port.
+
+    The stop port has the next higher number.
+    """
     check_address(values["port"], len(TRAITS.channels))
     return partial(UdpPorts, values["port"], len(TRAITS.channels))
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""When the command TIME, which sets the controller's clock, may be sent, and with which arguments.
+"""Decides when the controller's clock may be set with the command TIME, and with which arguments.
 
 TIME sets the clock to a full minute, and ignores the seconds. If the clock is set back between two
 motions, the controller computes a wrong heading. This module knows times only.

@@ -132,7 +132,7 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        A running board still accepts a command to stand still.
+        Even then, a running board accepts a command for a standstill.
         """
         return ""
 
@@ -240,7 +240,10 @@ class Board(Protocol):
         """Return the packets that stop the robot. The packets can depend on the robot's motion."""
 
     def emergency_stop(self) -> Packets:
-        """Return the board's own emergency stop, without Stop; empty if the board has none."""
+        """Return the packets of the board's own emergency stop; empty if the board has none.
+
+        They do not include the packets of ``stop``.
+        """
         return NO_PACKETS
 
     def switch_off(self) -> Packets:

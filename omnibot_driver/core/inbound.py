@@ -34,7 +34,7 @@ class Inbound:
         self._measurement, self._commanding = measurement, commanding
         self._liveness, self._reporter, self._safety = liveness, reporter, safety
         self._last: Reading | None = None
-        """Last of the readings that ``hear`` has decoded and ``process`` has not handled yet."""
+        """Newest reading that ``hear`` has decoded and ``process`` has not handled yet."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
         """Process bytes that arrived at ``now``: call ``hear``, then ``process``."""

@@ -61,16 +61,16 @@ class Wanted(Enum):
 CLOSED: Final = Phase.CLOSED
 SETTLED: Final = Phase.SETTLED
 PAUSED: Final = Wanted.PAUSED
-"""``CLOSED``, ``SETTLED``, ``PAUSED``: copies of Enum members for the checks at every read.
+"""``CLOSED``, ``SETTLED``, ``PAUSED``: copies of Enum members, for the checks at every read.
 
-Python 3.11 looks up Enum members slowly.
+They save time, because Python 3.11 looks up Enum members slowly.
 """
 
 
 class ModeManager:
     """The mode that was requested from a board, and the exchange with the board to reach it.
 
-    * ``run``: start the board whenever it is connected; else keep its mode.
+    * ``run``: whether to start the board at each connection. If False, the board keeps its mode.
     * ``answers``: answers to requests that the session has not taken yet.
     """
 

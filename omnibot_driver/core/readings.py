@@ -56,8 +56,8 @@ class PoseReading:
 
     * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
       does not count them again.
-    * ``restarted``: whether the counter of poses starts again. The counter of displacements has
-      started again before this pose.
+    * ``restarted``: whether the counter of poses starts again here. If so, the counter of
+      displacements has already started again before this pose.
     """
 
     x_m: float
@@ -71,7 +71,8 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    * ``continues``: whether the previous report was the same, without a restart since.
+    * ``continues``: whether the previous report was the same, and the board has not restarted
+      since.
     """
 
     continues: bool = False
@@ -159,7 +160,7 @@ class SampleBoundary:
 
     * ``latest_s``: latest time at which the cut sample can be complete; 0 without a cut sample.
     * ``earliest_s``: earliest time at which the cut sample can be complete. Without a cut sample:
-      the same for the next sample.
+      earliest time at which the next sample can be complete.
     """
 
     ahead: int

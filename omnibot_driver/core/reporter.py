@@ -36,7 +36,7 @@ class Reporter:
 
     * ``events``: events since the last ``take``.
     * ``news_at``: time of the next ``look_for_news``, in s.
-    * ``missing``: which of the board's ports are not open, as a sentence; empty if all are.
+    * ``missing``: which of the board's ports are not open, as a sentence; empty if all are open.
     * ``overruns``: how often a port has lost bytes, over all connections.
     * ``shown``: public state and e-stop latch at the last ``take``.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Safety stops: what stops the robot at once, whatever the source of its commands.
+"""Safety stops: the causes that stop the robot at once, whatever the source of its commands.
 
 * The e-stop is latched.
 * The board restarts, is paused, falls silent, or reports that the robot must be stopped.

@@ -40,7 +40,7 @@ class Session:
 
     * ``run``: whether to start the board whenever it is connected.
     * ``axis_signs``: for x, y, yaw: -1 if the board's axis is opposite to REP-103's.
-    * ``control``: control method that a switch on the board selects; None without this switch.
+    * ``control``: control method that a switch on the board selects; None without such a switch.
     * ``obeys``: False if the session replays a recording, which cannot follow commands.
     """
 
@@ -140,7 +140,7 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin a connection, because the port is open now.
 
-        ``missing``: which ports are not open, as a sentence. If any, the robot is not driven.
+        ``missing``: which ports are not open, as a sentence. If not empty, the robot is not driven.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -262,7 +262,7 @@ class Session:
         return self._safety.estop(active, now, by=by)
 
     def reset_odometry(self, now: float) -> None:
-        """Move the origin of the odometry frame to the robot's present pose.
+        """Move the origin of the odometry frame to the robot's current pose.
 
         A goal of ``cmd_pose`` in the old frame is dropped.
         """

@@ -21,13 +21,15 @@ class Traits:
     * ``wheels``: names of the wheels, in the order of ``wheel_cmd``.
     * ``unheard_s``: time without data, in s, after which the robot is stopped.
     * ``silence_s``: time without data, in s, after which the mode is unknown.
-    * ``own_odometry``: OdometryReadings give the pose; else the driver integrates displacements.
+    * ``own_odometry``: whether OdometryReadings give the pose. If not, the driver integrates
+      displacements.
     * ``stands_after_s``: time without motion, in s, that proves a standstill.
     * ``unproved_s``: longest time, in s, for which Stop is repeated without this proof.
     * ``baudrate``: whether the line has a baud rate.
-    * ``calibrates_gyro``: the board subtracts the gyro's bias; its profile offers
-      ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest time to obey an acknowledged stop, in s; 0: no acknowledgement.
+    * ``calibrates_gyro``: whether the board itself subtracts the gyro's bias. If so, its profile
+      offers ``~/calibrate_gyro``.
+    * ``stops_within_s``: longest time, in s, until the board obeys a stop that it has acknowledged;
+      0 if it does not acknowledge stops.
     * ``slack_mps``, ``slack_radps``: extra tolerance of the motion monitor, for coarse
       displacements or lagging wheels.
     * ``advice``: what to check at each motion fault; replaces the general advice.

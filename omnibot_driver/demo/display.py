@@ -59,7 +59,7 @@ def introduce(
 ) -> None:
     """Print what the demo does, and commands that the user can try.
 
-    ``options``: arguments of simulator and driver. ``exports``: environment variables to set.
+    ``options``: arguments of the simulator, then of the driver. ``exports``: environment variables.
     """
     imu = f"\n  ros2 topic hz {namespace}/imu/data_raw" * capability.imu
     turning = (

@@ -104,7 +104,7 @@ class Robot:
         return self._stood_for >= 5
 
     def row(self) -> str:
-        """Return a row of text with the present state, rates, pose and velocities."""
+        """Return a row of text with the current state, rates, pose and velocities."""
         now_s = time.monotonic()
         imu_hz = None if self.imu is None else round(self.imu.hz(now_s))
         rates_hz = (imu_hz, round(self.odom.hz(now_s)))

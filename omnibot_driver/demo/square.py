@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steers the robot around the square, from its pose and its present side of the square.
+"""Steers the robot around the square, from its pose and its current side of the square.
 
 A side is called a leg. Legs 0 to 3 lead along +x, +y, -x and -y of the odometry frame.
 """
@@ -27,7 +27,7 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the present leg, and the velocity to command in the robot's own axes.
+    """Return the current leg, and the velocity to command in the robot's own axes.
 
     The robot must be able to drive sideways. On each even leg it also turns 90° to the left, and on
     each odd leg it turns back.
@@ -46,7 +46,7 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the present leg and the velocity to command, for a robot that cannot drive sideways.
+    """Return the current leg and the velocity to command, for a robot that cannot drive sideways.
 
     This robot turns at the corners.
     """
@@ -59,7 +59,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """Return the present leg, and the robot's distances along the leg and to its left, in m."""
+    """Return the current leg, and the robot's distances along the leg and to its left, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)

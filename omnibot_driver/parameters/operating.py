@@ -56,9 +56,8 @@ LINE: Final = (
         "reconnect_interval",
         0.5,
         "s",
-        "Time until the driver tries to open a lost port again. After each failure, the driver"
-        " makes the time longer by a half, up to 2 s. If you set more than 2 s, the time stays"
-        " as you set it.",
+        "Time until the driver tries to open a lost port again. After each failure, this time"
+        " grows by half, up to 2 s. A value above 2 s does not grow.",
         low=0.05,
         high=60.0,
     ),

@@ -64,9 +64,9 @@ ROBOT: Final = (
         "fastest_linear_acceleration",
         15.0,
         "m/s²",
-        "Highest linear acceleration that the robot can reach, even in a collision. If a"
-        " displacement differs from the previous one by more than this acceleration permits, and"
-        " the next one jumps back, the driver rejects the middle one.",
+        "Highest linear acceleration that the robot can reach, even in a collision. The driver"
+        " rejects a displacement that differs from the previous one by more than this acceleration"
+        " permits, if the next displacement jumps back.",
         low=0.1,
         high=1000.0,
     ),
@@ -74,9 +74,9 @@ ROBOT: Final = (
         "fastest_angular_acceleration",
         50.0,
         "rad/s²",
-        "Highest angular acceleration that the robot can reach, even in a collision. If a"
-        " displacement or gyro reading differs from the previous one by more than this"
-        " acceleration permits, and the next one jumps back, the driver rejects the middle one.",
+        "Highest angular acceleration that the robot can reach, even in a collision. The driver"
+        " rejects a displacement or gyro reading that differs from the previous one by more than"
+        " this acceleration permits, if the next one jumps back.",
         low=1.0,
         high=10_000.0,
     ),
@@ -84,9 +84,9 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest change of one accelerometer axis between two readings that the driver always"
-        " accepts. If a reading differs from the previous one by more, the next one jumps back, and"
-        " a flipped bit can explain the difference, the driver rejects the middle one.",
+        "Largest change of an accelerometer axis, from one reading to the next, with which the"
+        " driver always accepts the reading. It rejects a reading only if the change is larger, the"
+        " next reading jumps back, and a flipped bit can explain the change.",
         low=0.1,
         high=1000.0,
     ),

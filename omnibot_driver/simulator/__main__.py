@@ -100,8 +100,8 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             metavar="PATH",
             action="append",
             help="make a symbolic link at PATH to the board's pseudo-terminal. If the board has"
-            " several, give one --link for each, in the order of the printed addresses; or give a"
-            " single --link, then the links are PATH-NAME, with the name of each port",
+            " several, give one --link for each, in the order of the printed addresses. If you give"
+            " only one, each link is PATH-NAME, where NAME is the name of the port",
         )
     if any(channel.datagrams for channel in module.CHANNELS):
         parser.add_argument(

@@ -12,9 +12,9 @@ all of them is regarded as a driver."""
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the full node names of the drivers whose SIGNS are all among ``topics``.
+    """Return the full names of the nodes that have all topics of SIGNS among ``topics``.
 
-    ``topics``: pairs of name and type.
+    ``topics``: pairs of a topic's name and its type.
     """
     pairs = set(topics)
     names = {topic.rpartition("/")[0] for topic, _kind in pairs}

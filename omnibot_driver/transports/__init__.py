@@ -46,10 +46,9 @@ class Transport(Protocol):
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether what is written stays in this process, as with a simulated board in memory.
+        """Whether the other end is in this process, like a simulated board in memory.
 
-        A simulated board ends with this process, so the driver does not start a guard process for
-        it.
+        Such a board ends with this process, so the driver does not start a guard process for it.
         """
 
     @property
@@ -59,7 +58,8 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet; return an empty packet if none arrives for a while.
 
-        Raises LinkError if the line is lost, LinesChanged if one of several is lost or open again.
+        Raises LinkError if the only line, or the last of several, is lost. Raises LinesChanged if
+        one of several lines was lost or opened again.
         """
 
     def write(self, packets: Packets) -> None:

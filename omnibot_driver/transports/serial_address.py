@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Names of serial ports: which ones can never be opened, and why one cannot be opened now.
+"""Rejects names of ports that can never be opened, and explains why a port cannot be opened now.
 
 Every text says what to do. This module knows pyserial's URLs and errors; it opens nothing.
 """

@@ -182,9 +182,10 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes, and sleep while the port has no room. pyserial would not sleep.
+    """Write all bytes, and sleep while the port accepts none. pyserial would not sleep.
 
-    Raises TimeoutError if the port has no room for 0.2 s (``WRITE_TIMEOUT_S``).
+    Raises TimeoutError if, after 0.2 s (``WRITE_TIMEOUT_S``), the port still does not accept the
+    rest of the bytes.
     """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
@@ -198,4 +199,4 @@ def _write_whole(descriptor: int, data: bytes) -> None:
         room = select.poll()
         room.register(descriptor, select.POLLOUT)
         if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
-            raise TimeoutError(f"it has accepted no data for {WRITE_TIMEOUT_S:g} s")
+            raise TimeoutError(f"it has not accepted all data within {WRITE_TIMEOUT_S:g} s")

@@ -22,7 +22,7 @@ from omnibot_driver.transports import (
 )
 from omnibot_driver.transports.wake_up import WakeUp
 
-FULL: Final = f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
+FULL: Final = f"it has not accepted all data within {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
 """Time in s between two attempts to open a missing line. The attempts do not disturb other
 lines."""
@@ -85,7 +85,7 @@ class Several:
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether what is written to the open lines stays in this process."""
+        """Whether the other ends of all open lines are in this process."""
         return all(port.ends_with_us for port in self._ports)
 
     @property
@@ -97,7 +97,7 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line is lost or open again, LinkError if all are missing.
+        Raises LinesChanged if a line was lost or opened again, LinkError if all are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -127,8 +127,9 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line. Bytes that a line does not accept at once are sent later.
 
-        If bytes have waited for 0.2 s without a break, they are discarded, and the line is regarded
-        as missing. A line that is missing already gets only the bytes that it accepts at once.
+        If a line has had waiting bytes for 0.2 s without a break, the bytes are discarded, and the
+        line is regarded as missing. A line that is missing already gets only the bytes that it
+        accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -199,7 +200,7 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write waiting bytes to each line with room; let ``poll`` report room on the others.
+        """Write the waiting bytes. ``poll`` then reports when a line accepts those that still wait.
 
         A line that has not accepted all of them for 0.2 s (``WRITE_TIMEOUT_S``) is regarded as
         missing.
@@ -257,7 +258,7 @@ class Line:
         self.retry_at = 0.0
         self.waits = b""
         self.watched = False
-        """Whether ``poll`` reports when the line has room."""
+        """Whether ``poll`` reports when the line accepts bytes again."""
         self._full_since = 0.0
 
     def begin(self, port: ByteLine) -> None:

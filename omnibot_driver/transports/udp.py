@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Datagrams to one host: ``udp://host:port``, each further channel one port higher.
+"""Datagrams to one host: ``udp://host:port``. Each further channel uses the next higher port.
 
 A host that does not answer is treated as a silent board, because it may answer later. It does not
 cause an error.
@@ -138,7 +138,7 @@ class UdpPorts:
                 room.register(ours, select.POLLOUT)
                 if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
                     raise TimeoutError(
-                        f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
+                        f"it has not accepted all data within {WRITE_TIMEOUT_S:g} s"
                     ) from None
             except OSError as error:
                 if not (may_be_stale and _is_silence(error)):

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make bench``: the delay of the front wheel's angle to the drive board.
+"""The Fejemis's part of ``make bench``: how late the drive board gets the front wheel's angle.
 
-The two simulated boards have their own process. Other processes keep the computer busy.
+The front board reports the angle, and the driver relays it to the drive board. The two simulated
+boards have their own process. Other processes keep the computer busy.
 """
 
 import contextlib

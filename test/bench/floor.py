@@ -2,8 +2,8 @@
 
 """The floor: the smallest program that has the same output as the driver, without any checks.
 
-``measurements PORT NAMESPACE``: publish an Imu for every IMU frame, an Odometry and a JointState
-for every delta.
+``measurements PORT NAMESPACE``: publish an Imu for every IMU frame; for every delta frame,
+publish an Odometry and a JointState.
 
 ``commands PORT NAMESPACE``: write a frame for every cmd_vel.
 

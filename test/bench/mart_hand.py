@@ -14,7 +14,7 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Commanded speeds in m/s. The zeros at the end last until the robot can be started again."""
+"""Commanded speeds in m/s. After the two zeros at the end, the robot can be started again."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 

@@ -91,7 +91,7 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start a relay that has the driver's tasks up to the task ``what`` (``steps.py``)."""
+    """Start ``steps.py`` with the step ``what``: a relay that has some of the driver's tasks."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 

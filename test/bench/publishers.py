@@ -12,7 +12,10 @@ from rclpy.node import Node
 
 
 def connected(namespaces: Sequence[str]) -> list[Any]:
-    """Initialize ROS, and return one publisher per namespace, 1 s after all have subscribers."""
+    """Initialize ROS, and return one publisher per namespace.
+
+    Before it returns, the function waits until each publisher has a subscriber, and then for 1 s.
+    """
     rclpy.init()
     node = Node("hand", start_parameter_services=False, enable_rosout=False)
     publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]

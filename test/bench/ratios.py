@@ -14,7 +14,8 @@ from statistics import median, quantiles
 class Figure:
     """The results of a measurement that was made several times.
 
-    Each time, the driver was measured first, then the floor: the least that any driver would need.
+    Each time, the driver was measured first, and then the floor. No driver can need less than the
+    floor.
 
     ``ours``, ``floor``: the values of driver and floor, in pairs.
 

@@ -56,9 +56,9 @@ def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
 
 
 def imu_ends() -> Iterator[int]:
-    """Yield for each tick the number of bytes that a board has sent up to the end of the IMU frame.
+    """Yield, for each tick, where its IMU frame ends in the stream of one board.
 
-    The number counts from the first tick.
+    The value is the number of bytes from the beginning of the stream to the end of the IMU frame.
     """
     begun = 0
     for tick in count():

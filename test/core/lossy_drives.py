@@ -14,10 +14,9 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""``ROUNDING_M``, ``ROUNDING_RAD``: largest error of odom (pose in the odometry frame) from the
-rounding of deltas.
+"""``ROUNDING_M``, ``ROUNDING_RAD``: largest errors of odometry from the rounding of deltas.
 
-The error grows until the next pose of the board corrects it.
+They grow until the next pose of the board corrects them.
 """
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
@@ -43,7 +42,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Return the time in s and the motion from each estimate to the next one."""
+    """Return, for each estimate but the first, the time and the motion since the one before."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)

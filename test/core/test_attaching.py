@@ -87,7 +87,7 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
     """The board sends no pose. After a second, the odometry assumes heading 0.
 
-    The odometry publishes the 25 waiting deltas together, and later ones at once.
+    The odometry publishes the 25 waiting deltas together, and each later delta immediately.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(24):
@@ -232,10 +232,10 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """The odometry frame gets a new place in the board's earth frame, for example by a reset.
+    """The odometry counts how often its frame gets a new place in the board's earth frame.
 
-    The odometry counts these changes and nothing else, because each of them makes old goals
-    invalid.
+    A reset, for example, changes this place. The odometry counts nothing else, because only these
+    changes make old goals invalid.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))

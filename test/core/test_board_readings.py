@@ -161,7 +161,7 @@ def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
 def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
     """A board reports displacements of zero, but marks them as not measured.
 
-    They do not prove rest.
+    These displacements do not prove a standstill.
     """
     proof = StopProof()
     proof.stopped(0.0)
@@ -171,7 +171,7 @@ def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
 
 
 def test_a_proof_takes_as_long_as_the_board_needs() -> None:
-    """The board needs 0.6 s for a proof of rest. Three displacements of 0.2 s prove it."""
+    """A proof of a standstill needs 0.6 s. Three zero displacements of 0.2 s each suffice."""
     proof = StopProof(0.6)
     proof.stopped(0.0)
     proved = []

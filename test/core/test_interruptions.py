@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry over pauses, restarts and an hour of driving, and odometry from wheel counts."""
+"""Odometry through pauses, restarts and an hour of driving, and odometry from wheel counts."""
 
 import math
 import struct
@@ -28,9 +28,9 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The board is paused during a drive, and the robot rolls out.
+    """The board is paused during a drive, and the robot rolls until it stands.
 
-    All frames of the pause may be lost. A second after the pause, odom is right.
+    In half of the tests, all frames of the pause are lost. One second later, odom is right.
     """
     on = line(seed)
     if hidden:
@@ -48,9 +48,9 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """The board restarts, so SEQ and its pose begin at zero. Some of its frames may be lost.
+    """The board restarts, so SEQ and its pose begin at zero.
 
-    Odom continues from its last pose.
+    In most cases, some of its frames are lost. Odom continues from its last pose.
     """
     on = line(seed)
     on.drives = False

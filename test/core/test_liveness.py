@@ -43,7 +43,7 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
     """A silence is reported, and then a reading arrives.
 
-    After another 2 s, a new silence is reported.
+    After another 2 s without data, a new silence is reported.
     """
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
@@ -80,8 +80,8 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
     """No data arrives. The driver wakes after 0.5 s if the robot is driven, otherwise after 2 s.
 
-    These are the limits of two rules: after 0.5 s without data, the driver ends a command; after 2
-    s, it regards the board as silent.
+    These are the limits of two rules. After 0.5 s without data, the driver ends a command. After
+    2 s without data, it regards the board as silent.
     """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5

@@ -151,7 +151,10 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """The board does not receive P. The driver repeats P until the board receives again."""
+    """The board does not receive P, so the pause fails. The driver then refuses motion.
+
+    When the board receives again, the driver pauses it.
+    """
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success

@@ -57,7 +57,7 @@ def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
 
 
 def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
-    """The driver shuts down during a request. The request fails and names this reason."""
+    """The driver shuts down during a request. The request fails, and its answer says why."""
     bench.speaks = False
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.shutdown.begin(bench.now)
@@ -68,13 +68,13 @@ def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None
 
 
 def test_requests_without_a_port_are_refused() -> None:
-    """Requests without a port are refused at once, not after a timeout."""
+    """While the port is closed, requests are refused immediately, not after a timeout."""
     with pytest.raises(RequestRefused, match="port is not open"):
         Bench().session.request(Request.START, object(), 0.0)
 
 
 def test_a_request_ends_with_the_port(bench: Bench) -> None:
-    """A request fails when the port is lost, so the caller does not wait in vain."""
+    """A request fails as soon as the port is lost, so the caller does not wait in vain."""
     bench.session.request(Request.RESET, token := object(), bench.now)
     bench.close()
     answers = [event for event in bench.events if isinstance(event, RequestDone)]

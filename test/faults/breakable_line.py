@@ -68,9 +68,9 @@ def noise(random: Random) -> Damage:
 
 
 def late(ticks: int) -> Damage:
-    """Return a function that collects bytes for this number of ticks, as some adapters do.
+    """Return a function that collects the bytes of ``ticks`` ticks, as some adapters do.
 
-    The function then delivers all collected bytes at once.
+    It then delivers all collected bytes together, and begins to collect again.
     """
     held: list[bytes] = []
 

@@ -2,7 +2,7 @@
 
 """A busy computer: four busy loops, and an adapter that delivers four bytes at a time.
 
-The line is undamaged, so no data may be lost.
+The line is undamaged, so all data must arrive.
 """
 
 import math
@@ -23,7 +23,7 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""The driver may warn about the cable only if the data pauses for at least this time, in s."""
+"""Shortest interruption of the data, in s, after which the driver is allowed to blame the cable."""
 TRANSIT: Final = 200
 """Largest number of sent frames whose messages have not arrived when the comparison begins."""
 REACH: Final = 200
@@ -123,8 +123,8 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages match no frame, and how many frames are skipped between matches.
 
-    Messages and frames are compared in order. Several frames may equal the first message, so the
-    comparison is made from each of them. The result with the fewest errors is returned.
+    Messages and frames are compared in order. If several frames equal the first message, one
+    comparison begins at each of these frames. The result with the fewest errors is returned.
     """
     starts = [n for n, key in enumerate(sent) if published and same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

@@ -29,7 +29,7 @@ HANGS_S: Final = 1.0
 DAMAGED_S: Final = 1.1
 """Time in s within which a robot on a damaged line must stop after the last command.
 
-The rig adds its grace time.
+The rig adds its ``grace_s`` to this time.
 """
 UNHEARD: Final = "moving without a command|stop unconfirmed"
 """Pattern of the log lines that a driver should print if the board does not receive Stop."""
@@ -197,7 +197,7 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 def estop(rig: Rig) -> None:
     """Latch the e-stop. While commands continue, the board reboots and the cable is pulled.
 
-    The robot stays at rest, also after the release.
+    The robot must stay at rest, also after the e-stop is released.
     """
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)

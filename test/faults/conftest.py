@@ -18,7 +18,7 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return three times for ``Rig``, in s. They are suitable for a busy computer.
+    """Return three durations for ``Rig``, in s. They are suitable for a busy computer.
 
     ``rest_s`` is short, but long enough for ten commands. A commander that does not stop is
     therefore noticed. ``make faults`` uses other times: 0.1 s, 2 s and 1 s.

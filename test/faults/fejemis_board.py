@@ -87,8 +87,8 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy (``half``) has the fault ``what`` while the robot drives.
 
-    ``allowed_s``: time in s within which the robot must stop, although commands continue. 0: the
-    robot may drive on until the end of the fault.
+    ``allowed_s``: time in s within which the robot must stop, although commands continue. If it is
+    0, the robot may drive on until the end of the fault.
     """
 
     def case(rig: Rig) -> None:

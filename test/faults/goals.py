@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Events that discard a goal of position control. The robot must rest until another command.
+"""Events that discard a goal of position control. The robot must then stand until the next command.
 
-Each event returns the tick from which the robot must rest.
+Each event returns the tick from which the robot must stand.
 """
 
 import signal
@@ -87,7 +87,7 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """Check that the event discards the goal: the robot must rest during and after the event."""
+    """Check that the event discards the goal: the robot must stand from the event on."""
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)

@@ -39,7 +39,7 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 ``GAP_MPS2``: largest acceleration in a gap of data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
-"""If one byte in 100 is lost, at most one of this number of messages may be wrong."""
+"""If one byte in 100 is lost, one published message in this number is allowed to be wrong."""
 ENDS_WITHIN_S: Final = 2.0
 
 
@@ -212,7 +212,7 @@ class Rig:
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
         """Expect the motors to be off soon after ``since_tick``, and to stay off for ``rest_s``.
 
-        ``allowed_s``: longest time from ``since_tick`` to rest, without the grace time.
+        ``allowed_s``: longest time from ``since_tick`` to standstill. ``grace_s`` is added to it.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)

@@ -32,13 +32,13 @@ class RigBoard:
 
     ``old_bytes_s``: time that the board needs to receive all old commands from a full port.
 
-    ``ends_later_s``: additional time within which the driver must end.
+    ``ends_later_s``: additional time that the driver may take to end.
 
-    ``rests_later_s``: additional time until the robot rests after several faults at the same time.
+    ``rests_later_s``: additional time until the robot stands after several simultaneous faults.
 
     ``deaf_s``: longest time for which the board may ignore its input.
 
-    ``silent_s``: longest usual pause between two transmissions of the board.
+    ``silent_s``: longest usual time between two transmissions of the board.
 
     ``jump_stddevs``: allowed correction of predicted odometry, in standard deviations of the pose.
 

@@ -11,7 +11,7 @@ from other_rigs import NetworkRig
 from rig import TIMEOUT_S, Rig
 from std_srvs.srv import SetBool
 
-TAKES_NOTHING: Final = "(lost .* while writing|is missing): it has accepted no data"
+TAKES_NOTHING: Final = "(lost .* while writing|is missing): it has not accepted all data"
 LOST: Final = "lost .*retrying"
 
 
@@ -61,7 +61,7 @@ def full_for_long(rig: Rig) -> None:
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):
         rig.probe.wait_for(lambda: len(rig.states) >= states + 6)  # opened twice without success
-        rig.wait_for_diagnosis("accepted no data")
+        rig.wait_for_diagnosis("not accepted all data")
         rig.hand.leave()
     rig.probe.wait_for_state("nominal")
     rig.expect_still(rig.line.tick, "the port takes bytes again, and is open", TIMEOUT_S)

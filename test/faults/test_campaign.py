@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of nearly every fault: the robot rests in time, and the driver publishes nothing false."""
+"""Tests of nearly every fault: the robot stops in time, and the driver publishes nothing false."""
 
 from collections.abc import Iterator
 from random import Random
@@ -56,9 +56,9 @@ def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
 
 
 def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
-    """Faults occur in random order, several at the same time. The robot rests in time, then obeys.
+    """Faults occur in random order, several at the same time. The robot stops in time.
 
-    ``make soak`` runs many more faults.
+    Afterwards it obeys a fresh command. ``make soak`` runs many more faults.
     """
     walk(rig, Random(0), steps=6)
     assert not rig.findings.take(), rig.driver.output

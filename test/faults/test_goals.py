@@ -56,7 +56,7 @@ def test_goals_are_pursued_by_what_was_sent(goals: GoalRig) -> None:
 def test_goals_and_faults_in_random_order(goals: GoalRig) -> None:
     """Faults occur in random order under position control.
 
-    The robot rests in time and then obeys.
+    The robot stops in time, and then obeys a fresh command.
     """
     walk(goals, Random(1), steps=3)
     goals.judge_stream(damaged_bytes=True)

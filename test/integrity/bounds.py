@@ -89,7 +89,7 @@ The limits for added bytes apply only to chunkings that deliver several frames a
 """
 
 Scores = dict[tuple[str, str, str], Score]
-"""The scores. A key is the names of fault, chunking and scenario."""
+"""The scores. A key consists of the names of a fault, a chunking and a scenario."""
 
 PLAIN_CHUNKING = "whole bursts"
 """The only chunking for the plain parser. With any other, this parser's result is the same."""

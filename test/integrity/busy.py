@@ -100,7 +100,7 @@ def read(
 def few_bytes_straddling(received: Received, random: Random) -> Chunks:
     """Deliver pieces of 1 to 8 bytes. Each piece is delivered when its last byte arrives.
 
-    A piece may contain a pause of the line.
+    The line may be idle between two bytes of a piece.
     """
     chunks, at = [], 0
     while at < len(received.times_s):

@@ -117,7 +117,7 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of one to eight bytes. A piece may contain a pause of the line.
+    """Deliver pieces of 1 to 8 bytes. The line may be idle between two bytes of a piece.
 
     Adapters keep no byte for more than 16 ms.
     """
@@ -131,7 +131,7 @@ def few_bytes(received: Received, random: Random) -> Chunks:
 
 
 def whole_bursts(received: Received, random: Random) -> Chunks:
-    """Deliver all bytes up to a pause of the line, like an adapter that waits for pauses."""
+    """Deliver all waiting bytes when the line becomes idle, as some adapters do."""
     times = received.times_s
     ends = [n for n in range(1, len(times)) if times[n] - times[n - 1] > 3e-3] + [len(times)]
     return [(end, times[end - 1]) for end in ends]

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reaction times of the motion monitor in board time: a table for internals/motion_monitor.md.
+"""Print the reaction times of the motion monitor, a table for internals/motion_monitor.md.
 
     PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
 A reaction time begins when the velocity differs from the command by 0.05 m/s or 0.15 rad/s. It
-ends when the driver sends Stop.
+ends when the driver sends Stop. The times are measured by the simulated clock.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ PERIODS_S = 0.04, 0.1
 
 
 def robot(**settings: object) -> Callable[[float], Bench]:
-    """Return a function that makes a test bench: a driver's session and a resting robot.
+    """Return a function that makes a test bench: a driver's session and a robot at rest.
 
     ``settings``: settings of the robot. The function's argument is the period of the displacements,
     in s.

@@ -13,10 +13,11 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Largest number of intact frames that may be skipped to find the true frame of a decoded frame.
+"""Largest number of intact frames that the judge skips without further evidence.
 
-If more are skipped, the decoded frame is right only if the next decoded frame matches, too. This
-excludes false frames that happen to equal a much later true frame.
+It skips them to find the true frame of a decoded frame. If it skips more, the decoded frame is
+right only if the next decoded frame matches soon afterwards. This excludes false frames that happen
+to equal a much later true frame.
 """
 REACH_BYTES = 600
 """The search for a decoded frame's true frame begins about this number of bytes before the read."""

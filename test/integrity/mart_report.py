@@ -54,7 +54,7 @@ If the covariances are right, 1 pose in 270,000 has a larger error by chance.
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
-"""If the robot is farther than this from its start, in m, only turns are commanded.
+"""Distance of the robot from its start, in m, beyond which only turns are commanded.
 
 Otherwise the robot might reach the wall.
 """
@@ -86,9 +86,9 @@ class Score:
 
 
 def drive(name: str, seconds: float, seed: int) -> Score:
-    """Drive random motions with rests between them, and return the score.
+    """Drive random motions, let the robot stand between them, and return the score.
 
-    During the rests, the driver polls sonars and battery.
+    While the robot stands, the driver polls sonars and battery.
     """
     random, score = Random(f"{name} {seed}"), Score()
     bench = MartBench(

@@ -28,7 +28,7 @@ OTHERWISE: Final = {
     "mart": "datagrams arrive whole or not at all; tests search all that their losses can do",
     "fejemis": "outbound lines carry a sum; tests try all losses of one and two characters",
 }
-"""Boards that this report does not measure. The value is the reason."""
+"""Boards that this report does not measure, each with the reason."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 

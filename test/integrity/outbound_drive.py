@@ -39,7 +39,7 @@ History = tuple[tuple[int, Shown], ...]
 class Write:
     """Bytes that the driver or its guard writes.
 
-    ``flush``: whether the bytes that still wait are discarded first.
+    ``flush``: whether the bytes of earlier writes that the line has not carried yet are discarded.
     """
 
     at_s: float
@@ -74,7 +74,7 @@ class Scene:
 
     ``run``: whether the driver starts the board.
 
-    ``linear_scale``: LSB per m/s.
+    ``linear_scale``: the units (LSB) of a command that mean 1 m/s.
 
     ``exits_s``, ``killed_s``: the time of the driver's end, on request or by force.
 

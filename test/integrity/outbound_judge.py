@@ -25,7 +25,7 @@ _LONGEST: Final = ("stray_s", "longest_s")
 
 @dataclass(slots=True)
 class Score:
-    """Counts and times of trials, in s. Scores can be added. The module defines the terms.
+    """Counts from trials, and times in s. Scores can be added. The module defines the terms.
 
     ``strayed``: number of trials with stray motion. ``stray_s``: duration of the longest one.
 

@@ -36,7 +36,7 @@ OTHER_TRIALS: Final = 20
 ESTOPS: Final = ("e-stop", "goal", "exit")
 """Scenes in which it matters whether the board obeys an emergency stop."""
 BOOTS: Final = ("reset", "exit")
-"""Scenes in which bytes that arrive during the boot may wake the board up."""
+"""Scenes in which bytes that arrive during the boot can wake the board up."""
 
 RECEIVERS: Final = {
     f"{framing.replace('_', ' ')}, letters {letters}": (framing, letters)
@@ -44,7 +44,7 @@ RECEIVERS: Final = {
     for letters in ("between", "anywhere")
 }
 Scores = dict[tuple[str, str, str], Score]
-"""The scores. A key is the names of fault, receiver and scene."""
+"""The scores. A key consists of the names of a fault, a receiver and a scene."""
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:

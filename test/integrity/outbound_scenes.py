@@ -51,7 +51,7 @@ def driving(
 ) -> list[Command]:
     """Return commands from ``begin_s`` to ``end_s``, which change at random times.
 
-    ``rate_hz``: rate of the commands. 0: a random rate.
+    ``rate_hz``: rate of the commands. If it is 0, the rate is random.
     """
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
@@ -158,7 +158,7 @@ def zero(random: Random) -> Scene:
 
 
 def switch(random: Random) -> Scene:
-    """Make a scene in which cmd_vel and wheel_cmd alternate, with and without pauses."""
+    """Make a scene in which cmd_vel and wheel_cmd alternate, immediately or after up to 0.1 s."""
     wishes: list[Command] = []
     now = FROM_S
     for number in range(4):

@@ -38,7 +38,7 @@ class Shown(NamedTuple):
 class Teller:
     """A minimal board.
 
-    ``linear_scale``: LSB per m/s.
+    ``linear_scale``: the units (LSB) of a command that mean 1 m/s.
 
     ``goals``: whether the board drives to goals, as under position control.
     """

@@ -2,7 +2,7 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board reports a moving robot while the driver drives, and while the board's own set-point is a
+The board reports a moving robot while the driver drives, or while the board's own set-point is a
 motion. A change of the board's state appears in its reports after one or two ticks.
 """
 
@@ -34,9 +34,9 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
-A key has the bytes that the receiver held before, whether a pause preceded the new bytes, and the
-new bytes. A value has the bytes that the receiver holds afterwards, and the frames that it found,
-each with the position of its last byte. The value is ``None`` if the bytes contain a letter.
+A key has the bytes that the receiver held before, whether the line was idle then, and the new
+bytes. A value has the bytes that the receiver holds afterwards, and the frames that it found, each
+with the position of its last byte. The value is ``None`` if the bytes contain a letter.
 """
 
 

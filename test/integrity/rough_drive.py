@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulated robots that obey, on bad floors and among people, in simulated time.
+"""Simulated robots that obey, on slopes, with slip and among people, in simulated time.
 
 The motion monitor must not stop them.
 """

@@ -81,9 +81,9 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The last byte of a motion frame is lost, so the zeros of the next write complete the frame.
+    """The last byte of a motion frame is lost, so a zero of the next write completes the frame.
 
-    This wrong command lasts only until the next frame, for less than 1.5 ms.
+    The board obeys this wrong frame only until the next frame, for less than 1.5 ms.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(

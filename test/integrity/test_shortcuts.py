@@ -112,9 +112,9 @@ pieces = st.sampled_from(
 @settings(max_examples=200)
 @given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
 def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
-    """Pieces of streams and noise arrive in any order, with any pauses.
+    """Pieces of streams and noise arrive in any order, up to 0.2 s apart.
 
-    Shortcuts change no result.
+    The shortcuts of the decoder change no result.
     """
     now, chunks = 0.0, []
     for data, pause_s in arrivals:
@@ -221,7 +221,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder can restore the state that it had after any earlier frame of a run.
+    """The decoder can restore the state that it had after any earlier frame.
 
     To restore this state, the decoder evaluates at most 6 frames again.
     """

@@ -53,9 +53,9 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 
 
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
-    """Return the position of a wheel in m, and the velocity of its centre over the floor, in m/s.
+    """Return the position of a wheel in m, and the velocity of its centre over the ground in m/s.
 
-    The wheel turns with ``rate_radps``, and its lowest point rests on the floor.
+    The wheel turns with ``rate_radps``, and its lowest point touches the ground without slip.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -95,7 +95,7 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
     """The driver's kinematics convert a motion of the body to wheel rates.
 
     The wheels of the description turn at these rates. In its rolling direction, each wheel moves
-    over the floor as fast as the body does at this place. Motion across this direction is not
+    over the ground as fast as the body does at this place. Motion across this direction is not
     compared, because the rollers allow it.
     """
     kinematics = OmniKinematics(

@@ -29,7 +29,7 @@ def make(*arguments: str) -> subprocess.CompletedProcess[str]:
 def no_python(tmp_path: Path) -> str:
     """Return the path of an interpreter that always fails.
 
-    It stands for a Python version without wheels on PyPI.
+    It represents a Python version for which PyPI has no binary packages.
     """
     interpreter = tmp_path / "python"
     interpreter.write_text("#!/bin/sh\nexit 1\n")
@@ -41,9 +41,9 @@ def no_python(tmp_path: Path) -> str:
 def test_without_wheels_one_sentence_points_to_jazzy(
     target: str, no_python: str, tmp_path: Path
 ) -> None:
-    """PyPI has no wheels for this Python. make fails, and names the installation guide of Jazzy.
+    """PyPI has no binary packages for this Python, so make fails.
 
-    make does not create a virtual environment.
+    make names the installation guide of Jazzy, and does not create a virtual environment.
     """
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()

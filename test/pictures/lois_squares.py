@@ -2,8 +2,8 @@
 
 """Picture of squares of 5 m that a simulated LOIS ECU drives: the true path and that of ``odom``.
 
-Both firmware variants drive to the left and to the right. The errors are printed as rows of a
-table.
+With each firmware variant, it drives one square to the left and one to the right. The errors are
+printed as rows of a table.
 """
 
 import math

@@ -28,7 +28,7 @@ from omnibot_driver.tools.report.__main__ import main as report
 
 SHOWN = ("path", "timeline", "timing", "velocities")
 REST = 75
-"""Number of odom messages to wait for while the robot is at rest: three seconds."""
+"""Number of odom messages during each standstill of the robot. It lasts three seconds."""
 STOPPED_ON_LEG = 6
 
 
@@ -52,7 +52,7 @@ def main(folder: Path) -> None:
 
 
 def _drive(probe: Probe, recorder: Recorder, namespace: str) -> None:
-    """Rest, drive seven sides of squares with an e-stop on the last side, and rest."""
+    """Stand, drive seven sides of squares with an e-stop on the last side, and stand again."""
     topic, kind, qos = f"/{namespace}/cmd_vel", "geometry_msgs/msg/Twist", QoSProfile(depth=10)
     recorder.types[topic], recorder.offered[topic] = kind, as_recorded(qos)
     recorder.hear(topic, kind, qos)

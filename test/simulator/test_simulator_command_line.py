@@ -24,7 +24,7 @@ from omnibot_driver.simulator.__main__ import boards, main, run
 def test_the_console_helps_and_says_what_it_does_not_know() -> None:
     """A user types ``help`` and an unknown word.
 
-    The texts go to stderr, because stdout is for answers.
+    The help and the error message go to stderr, because stdout is for answers.
     """
     with toy("toy_udp") as process:
         line(process)

@@ -141,7 +141,7 @@ def read(path: Path) -> tuple[dict[str, list[Message]], dict[str, Qos]]:
 
 
 def equal(ours: Any, theirs: Any) -> bool:
-    """Return whether two messages have equal fields: one from rclpy, and one from rosbags."""
+    """Return whether a message from rclpy and one from rosbags have equal fields."""
     if hasattr(ours, "get_fields_and_field_types"):
         names = ours.get_fields_and_field_types()
         return all(equal(getattr(ours, name), getattr(theirs, name)) for name in names)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board whose short ticks pass in batches, so that the computer wakes up less often."""
+"""A simulated board that runs its short ticks in groups, so the computer wakes up less often."""
 
 from typing import Final
 

@@ -84,7 +84,7 @@ def probe(driver: Driver, probe_of: Callable[[Driver], Probe]) -> Probe:
 
 @pytest.fixture
 def silent_terminal() -> Iterator[tuple[int, str]]:
-    """Yield a pseudo-terminal without a board: the descriptor of its far end, and its name."""
+    """Yield a pseudo-terminal without a board: the descriptor of the board's end, and the name."""
     far, near = os.openpty()
     tty.setraw(near)
     yield far, os.ttyname(near)

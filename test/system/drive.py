@@ -78,7 +78,7 @@ class Outcome:
 
 
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
-    """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames.
+    """Drive for ``seconds``, stand still for 2 s, and compare the messages with the board's frames.
 
     The caller must have initialised rclpy.
     """
@@ -212,7 +212,10 @@ def outwards(middle: int, reach: int) -> Iterator[int]:
 
 
 def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[float]) -> int:
-    """Estimate the index of the IMU frame at ``stamp_s`` from a matched message nearby."""
+    """Estimate the index of the IMU frame that was sampled at ``stamp_s``.
+
+    The estimate is based on a message that was sampled near this time and whose frame is known.
+    """
     place = min(bisect_left(stamps_s, stamp_s), len(stamps_s) - 1)
     while (number := found[place]) is None:
         place -= 1
@@ -256,7 +259,7 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return the displacement from which a message's twist was computed: its length and turn.
+    """Return the length and turn of the displacement from which a message's twist was computed.
 
     The length is in 0.1 mm, and the turn in 0.1 mrad.
     """

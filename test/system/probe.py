@@ -25,9 +25,9 @@ from omnibot_driver.stall_detector import SETTLE_S
 
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
-"""The probe does not wait for events of the middleware.
+"""Options that turn off the events of the middleware, for subscriptions and for publishers.
 
-The executor would add each event to every wait, which takes more time than the messages.
+The executor would add each event to every wait. This would take more time than the messages.
 """
 
 
@@ -144,9 +144,10 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again, some seconds later.
+        """Publish the probe's newest message again after some seconds.
 
-        By then, the driver's stall has ended, and the driver can log another refusal.
+        By then, the driver's stall has ended. If the driver refuses the message again, it logs this
+        again.
         """
 
         def publish() -> None:

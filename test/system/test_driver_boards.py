@@ -84,7 +84,8 @@ def test_a_deleted_parameter_does_not_block_the_others(
 ) -> None:
     """A user asks to delete an optional parameter. The driver refuses.
 
-    Otherwise every later change would fail, because a change reads all parameters.
+    If the parameter were deleted, every later change would fail, because a change reads all
+    parameters.
     """
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))
     deleted = [RosParameter(name="gain", value=ParameterValue())]

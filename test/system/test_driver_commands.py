@@ -229,7 +229,7 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 ) -> None:
     """A stamped command is older than ``cmd_vel_timeout``. The driver refuses it.
 
-    A stamp of zero is not a time, so such a command is obeyed.
+    A command whose stamp is zero is obeyed, because zero is not a time.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)

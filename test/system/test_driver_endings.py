@@ -149,7 +149,7 @@ def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
 ) -> None:
     """The kernel's buffer for data to the board is full. The driver still ends.
 
-    Afterwards, its guard process tries to send Stop until there is room.
+    Afterwards, its guard process tries to send Stop until the buffer has space.
     """
     far, path = silent_terminal
     driver: Driver = start_driver(path, auto_start=False)

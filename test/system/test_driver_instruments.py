@@ -147,7 +147,7 @@ def test_the_bias_is_what_was_set_last(
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
     """A user sends wheel_cmd. The wheels in joint_states turn at the commanded rates.
 
-    Order, signs and units are the same.
+    Their order, signs and units are those of the command.
     """
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
@@ -248,7 +248,7 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
 ) -> None:
     """With ``use_sim_time``, measurements wait until /clock has a time.
 
-    The measurements of a simulated board wait, too, because the board's time differs from /clock.
+    A simulated board does not follow /clock, so its measurements wait, too.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

@@ -242,8 +242,8 @@ def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
 ) -> None:
     """A client sets an unknown parameter, one of another board, or a value of an unknown type.
 
-    The driver refuses the change with a reason, and continues. Earlier, a value of an unknown type
-    led to an exception in rclpy, which ended the driver.
+    The driver refuses the change with a reason, and continues. In earlier versions, a value of an
+    unknown type led to an exception in rclpy, which ended the driver.
     """
     driver: Driver = start_driver("sim://")
     probe: Probe = probe_of(driver)

@@ -49,7 +49,7 @@ def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
 def test_an_unplugged_board_is_found_again(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """A board is unplugged twice and plugged in again. The driver opens its port each time.
+    """Twice, a board is unplugged and plugged in again. The driver opens its port each time.
 
     No file descriptors are left open.
     """

@@ -72,7 +72,7 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 ) -> None:
     """A button publishes true on ``estop``, then 50 times false. All messages arrive at once.
 
-    The e-stop is still latched after the driver has taken them all.
+    The e-stop is still latched after the driver has processed all messages.
     """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
@@ -267,7 +267,7 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
     """A user calls ``~/reset_odometry`` after a drive.
 
-    The present pose becomes the origin of odom.
+    The robot's current pose becomes the origin of odom.
     """
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)

@@ -96,7 +96,7 @@ def test_a_board_at_10_hz_needs_its_delta_period(
 ) -> None:
     """A board sends displacements every 0.1 s. With the right ``delta_period``, the twist is right.
 
-    With a wrong one, the driver names the right value.
+    With a wrong ``delta_period``, the driver names the right value.
     """
     board: PtyBoard = start_board(running=True, delta_period_s=0.1)
     driver: Driver = start_driver(board.path, delta_period=told_s)
@@ -180,7 +180,7 @@ def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
 ) -> None:
     """A board has driven before, so its own pose is not zero, and its heading is 90°.
 
-    odom nevertheless begins at the identity, with forward along x.
+    The first pose in odom is nevertheless zero, and the robot faces along x.
     """
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))

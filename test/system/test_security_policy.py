@@ -126,7 +126,7 @@ def seen(graph: Node, home: str) -> Rules:
 
 @pytest.mark.parametrize("enclave", sorted(set(profiles()) - {"/omnibot/driver"}))
 def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: str) -> None:
-    """The policy allows other enclaves only what the driver has, and topics that all nodes have."""
+    """The policy gives other enclaves only the driver's topics and services, and common topics."""
     driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
     everywhere = {"/rosout", "/parameter_events", "/clock"}
     assert other["publish"] <= driver["subscribe"] | everywhere

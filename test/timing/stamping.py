@@ -32,10 +32,10 @@ READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""For each event in the middle of a stream, the time in s for which the host then reads nothing."""
+"""Events in the middle of a stream, and how long the host reads nothing at each of them, in s."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
-"""The generator of streams, cached. All lines get the same stream object and must not change it."""
+"""The generator of streams, cached. Callers share each stream, so they must not change it."""
 BOOT_S = 0.7123
 
 
@@ -114,7 +114,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Return half the width of the narrowest interval that contains ``part`` of the errors."""
+    """Return half the width of the narrowest interval with the share ``part`` of the errors."""
     ordered = sorted(errors)
     ends = zip(ordered, ordered[math.ceil(part * len(ordered)) - 1 :], strict=False)
     return min(high - low for low, high in ends) / 2

@@ -38,7 +38,7 @@ def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either
 ) -> None:
     """One byte in 100 is lost, on streams on which an old version of the driver failed.
 
-    The stamps are right.
+    The stamps are nevertheless correct.
     """
     stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
     assert stamped.unevenness() < 0.2e-3

@@ -100,7 +100,7 @@ class Deaf:
 
 
 def walk(*answers: str) -> Found:
-    """Run the part of the procedure for wheels and axes with these answers.
+    """Run the part of ``calibrate commission`` for wheels and axes, with these answers.
 
     Return what it finds.
     """

@@ -49,7 +49,7 @@ def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """The bias is measured in 100 rests. The claimed uncertainties agree with the true errors.
+    """The bias is measured at rest, 100 times. The claimed uncertainties agree with the errors.
 
     An error divided by its claimed uncertainty has a standard deviation near 1.
     """
@@ -101,7 +101,7 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
 def test_a_minute_of_readings_is_enough_for_the_walk_of_a_bias(seconds: int, fitted: bool) -> None:
     """The bias drifts fast, and two readings are missing.
 
-    A rest of a minute, the default, shows the drift. A rest of 50 s does not.
+    A minute at rest, the default, is enough to show the drift, but 50 s are not.
     """
     random = np.random.default_rng(3)
     steps = 2e-3 * random.standard_normal(100 * seconds - 2)
@@ -128,7 +128,7 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 
 
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
-    """A picture of noise does not compress well. The picture of a long rest omits many points.
+    """The picture of a long measurement omits points, because noise does not compress well.
 
     The file is therefore smaller than 170 kB.
     """

@@ -47,7 +47,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` every time, once ``AFTER_S`` seconds have passed."""
+    """Return a callback that calls ``action`` at each of its calls, from ``AFTER_S`` seconds on."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -191,7 +191,7 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 def test_parameters_are_restored_after_an_interruption(robot: Robot, rigged: Rig) -> None:
     """Ctrl-C interrupts a measurement for which the tool has set a parameter of the driver.
 
-    After that, other parameters can no longer be set.
+    After that, the tool can set no parameter for a measurement, but it can restore former values.
     """
     robot.set_parameters({"linear_scale": 60.0})
     os.kill(os.getpid(), signal.SIGINT)
@@ -222,7 +222,7 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 ) -> None:
     """The user suspends the tool during a motion, so the driver stops the robot.
 
-    When the tool resumes, it sends only zeros and ends with an error.
+    When the tool resumes, it sends only zero commands and ends with an error.
     """
     clock = SimpleNamespace(monotonic=time.monotonic)
 
@@ -250,8 +250,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
     with pytest.raises(
         ToolError,
-        match=r"^Stop was sent, but the robot still moves or sends no"
-        r" odometry",
+        match=r"^Stop was sent, but the robot still moves, or no odometry arrives",
     ):
         robot.drive(steady(SLOWLY, 0.5), BOUNDS)
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)

@@ -87,7 +87,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """The commands pause while one speed is measured, so the driver may have stopped the robot.
+    """While one speed is measured, commands are missing, so the driver may have stopped the robot.
 
     The tool does not use the measurement of this speed.
     """

@@ -301,7 +301,7 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
     """The motion fits neither velocity nor positional control, so the tool finds no control method.
 
-    For example, a command came late, and the robot becomes faster during the measurement.
+    For example, a command comes late, so the robot becomes faster during the measurement.
     """
     assert control_method(slow, fast, 0.06) is None
 
@@ -312,8 +312,9 @@ def test_the_wrong_frame_turns_with_the_robot(
 ) -> None:
     """The robot gets the same command before and after a turn.
 
-    In the right frame, the direction in the body's axes is the same. In the wrong frame, it changes
-    by the angle of the turn. Any other change is an error.
+    If the driver assumes the correct frame, odometry shows the same direction in the axes of the
+    body. With the wrong frame, the direction changes by the angle of the turn. Any other change is
+    an error.
     """
 
     def heading(rad: float) -> Drift:

@@ -118,7 +118,7 @@ def test_the_estop_is_released_by_two_keys() -> None:
 def test_space_stops_even_while_a_question_stands() -> None:
     """The monitor asks whether to release the e-stop, and the user presses the space bar.
 
-    The monitor takes this as no, and requests the e-stop again.
+    The monitor takes this as the answer "no", and requests the e-stop again.
     """
     assert press("R", "space", "y").asked == ["estop"]
 

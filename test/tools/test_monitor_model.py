@@ -100,7 +100,7 @@ def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
 def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
     """A pose has NaN or infinity.
 
-    The view shows the pose and names the value, but the path omits it.
+    The view shows the pose and names the value, but the path omits this pose.
     """
     model = Model("/omnibot_driver", 0.0)
     for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):

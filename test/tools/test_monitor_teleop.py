@@ -97,9 +97,9 @@ def test_stop_is_at_once() -> None:
 
 
 def test_who_has_not_steered_commands_nothing() -> None:
-    """Before the first steering key, the monitor publishes no commands, not even zeros.
+    """Before the first steering key, the monitor publishes no commands, not even zero commands.
 
-    Zeros would disturb another node that drives the robot.
+    Zero commands would disturb another node that drives the robot.
     """
     dead_man = DeadMan()
     assert not dead_man.press("x", 0.0)

@@ -84,7 +84,7 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 ) -> None:
     """IMU or odometry messages are lost for 2 s during a turn.
 
-    The report does not compare gyro and wheels in this gap. They agree in the rest of the drive.
+    The report does not compare gyro and wheels in this gap. They agree at all other times.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
@@ -94,7 +94,7 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
     """The odometry has a gap, in which the robot may turn.
 
-    The report does not regard the gap as rest.
+    The report does not regard the gap as a standstill.
     """
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
@@ -208,7 +208,7 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 
 
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
-    """The commands pause. The report notes this, because it explains why the robot stood still."""
+    """Commands are missing for a while. The report notes this, since it explains a standstill."""
     drive.cmd_vel.drop(10.0, 10.8)
     assert "1 time, first at 9.9 s" in said(drive, "Commands", "paused").text
 

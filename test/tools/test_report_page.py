@@ -98,5 +98,5 @@ def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) ->
     [(0.02, "0.02 s"), (9.0, "9 s"), (99.6, "100 s"), (150.4, "2 min 30 s"), (7384, "2 h 03 min")],
 )
 def test_lengths_of_time_are_told_as_people_do(seconds: float, told: str) -> None:
-    """Lengths of time are shown briefly: in s, in min and s, or in h and min."""
+    """Durations are shown in a short form: in s, in min and s, or in h and min."""
     assert span(seconds) == told

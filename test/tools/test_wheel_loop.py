@@ -177,7 +177,9 @@ def test_if_no_gains_are_within_the_limits_none_are_proposed(
 ) -> None:
     """The limit of Ms is below 1, which no loop can reach. The tool says so."""
     monkeypatch.setattr(tuning, "LARGEST_MS", 0.9)
-    with pytest.raises(ToolError, match=r"no gains keep Ms at most 0\.9"):
+    with pytest.raises(
+        ToolError, match=r"no gains limit the peak of the sensitivity \(Ms\) to 0\.9"
+    ):
         better_gains([Motor(46.0, 6.0, 0.0)])
 
 

@@ -2,7 +2,7 @@
 
 """A toy board: requests over UDP, and one blocking move at a time.
 
-``WHERE``: the reply ``at WAY TURN`` is the motion since the previous such reply, in mm and mrad.
+``WHERE``: the reply ``at WAY TURN`` is the motion since the previous ``WHERE``, in mm and mrad.
 
 ``MOVE V W``: move at V mm/s and W mrad/s for 0.2 s, then reply ``ok``.
 

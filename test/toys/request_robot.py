@@ -12,7 +12,7 @@ TICK_S = 0.01
 
 
 class RequestRobot:
-    """A robot that handles one request at a time. Further requests wait for their turn."""
+    """A robot that handles one request at a time. Later requests wait until it has finished."""
 
     channels, tick_s = CHANNELS, TICK_S
 

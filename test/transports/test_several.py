@@ -138,7 +138,7 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
     finally:
         select.poll = poll  # type: ignore[misc]
     assert heard(ends.far[1], b"stopstop") == b"stopstop"
-    assert changed(lines) == {0: "it has accepted no data for 0.2 s"}
+    assert changed(lines) == {0: "it has not accepted all data within 0.2 s"}
     lines.write(((0, b"new"), (1, b"stop")))
     assert heard(ends.far[0], b"new").strip(b"x") == b"new"
 
@@ -176,7 +176,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A line is full. The data of two writes follows in order as soon as the reader makes room."""
+    """A line is full. The data of two writes follows in order as soon as the other end reads."""
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 60.0)
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -218,7 +218,7 @@ def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
 def test_where_none_can_be_opened_none_is_kept() -> None:
     """No line can be opened.
 
-    The error is that of the first one, and no file descriptor stays open.
+    The error is that of the first line, and no file descriptor stays open.
     """
     before = len(os.listdir("/proc/self/fd"))
     paths = "/dev/no-such", "/dev/no-such-either"

@@ -86,7 +86,7 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """The driver does not read. A channel keeps as many bytes as a terminal would.
 
-    Later bytes are dropped and counted. The other channel still has room.
+    Later bytes are dropped and counted. The other channel still accepts bytes.
     """
 
     class Talking(toy_lines.ToyLines):
@@ -141,7 +141,7 @@ def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> 
 def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -> None:
     """A URL has a wrong option.
 
-    The message says why, and names the command that lists the options.
+    The message says what is wrong, and names the command that lists the options.
     """
     with pytest.raises(ParameterError) as refusal:
         check_address(url, TOY)

@@ -44,8 +44,9 @@ class Interlocks:
     def refused(self, now: float) -> None:
         """Record that a motion command was refused, so that its sender is known to be active.
 
-        The motion interlock may wait for a pause without commands. A refused command ends the pause
-        too. Call this for every refused command, also if another check has refused it.
+        The motion interlock may wait until no command has arrived for some time. A refused command
+        makes this wait begin again. Call this for every refused command, also if another check has
+        refused it.
         """
         self._interlock.be_active(now)
 
@@ -77,7 +78,7 @@ class Interlocks:
         return tripped
 
     def why_not_task(self) -> str:
-        """Return the reason why a long task cannot begin; empty if it can."""
+        """Return the reason why a task, such as a recording, cannot begin; empty if it can."""
         if self.leaving:
             return self.why_not_request()
         if self._mode_manager.phase is Phase.CLOSED:

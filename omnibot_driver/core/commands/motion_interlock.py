@@ -66,8 +66,9 @@ class MotionInterlock:
     def be_active(self, now: float) -> None:
         """Record that a sender of commands was active at ``now``.
 
-        A pause without commands ends the refusal after a first stop. This pause begins again here.
-        Call this when a command is refused, and after a stall of this process.
+        After a first stop, the refusal ends when no command has arrived for ``timeout_s``
+        (``arrive``). This time begins again here. Call this when a command is refused, and after a
+        stall of this process.
         """
         self._commanded_at = now
 
@@ -76,7 +77,7 @@ class MotionInterlock:
 
         ``stands``: whether the command is to stand still, which is always allowed.
 
-        ``timeout_s``: pause without commands, in s, that ends the refusal after a first stop. It
+        ``timeout_s``: time without commands, in s, that ends the refusal after a first stop. It
         does not end the refusal after a second stop within 60 s.
         """
         silent = now - self._commanded_at >= timeout_s

@@ -192,7 +192,7 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion is taken from the newest estimate; if unknown there, from ``reading``.
+        The motion comes from the newest estimate, or from ``reading`` if the estimate has none.
         """
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:

@@ -36,7 +36,7 @@ class Encoder(Protocol):
         """Return the packets that make the robot stand still."""
 
     def emergency_stop(self) -> Packets:
-        """Return the board's own emergency stop, without Stop."""
+        """Return the packets of the board's own emergency stop, without those of ``stop``."""
 
     def encode(self, order: Order) -> Packets:
         """Return the packets for this order. Raises CommandRefused if it cannot be encoded."""
@@ -49,8 +49,8 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     * ``proof``: receives a report of each stop and motion sent.
-    * ``heard``: function that is called with all packets written, also those of requests, and the
-      time.
+    * ``heard``: function that is called after each write, with the packets and the time. It is also
+      called for the packets of requests.
     """
 
     def __init__(

@@ -51,7 +51,7 @@ class Setpoint(Protocol):
 
     @property
     def final(self) -> Order:
-        """The order that this command gives at last, after any ramp."""
+        """The order that this command gives when its ramp, if any, has ended."""
 
     def order(self, now: float) -> Order:
         """Return the order for the time ``now``."""

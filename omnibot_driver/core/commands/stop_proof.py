@@ -24,15 +24,15 @@ SLACK_S: Final = 1e-6
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof.
 
-A single one could be damaged, or could have been measured before the wheels turned.
+A single displacement could be damaged, or could have been measured before the wheels turned.
 """
 PROOFS: Final = 2.0
 """Shortest wait for a proof, as a multiple of the duration of standstill that a proof needs."""
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-If a displacement has a longer duration, others before it were lost, and it includes their motion.
-Its duration is not the period.
+If a displacement has a longer duration, earlier displacements were lost, and this one includes
+their motion. Its duration is then longer than the period.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
@@ -43,7 +43,8 @@ class StopProof:
     """The proof that the robot stands still.
 
     * ``proved``: whether a standstill is proved. The proof: since Stop, the robot has stood still
-      for ``still_s``, or the board has paused. A command to move or a measured motion ends it.
+      for ``still_s``, or the board has paused. A command to move or a measured motion ends
+      the proof.
     * ``owed``: whether a motion was sent, and no standstill was proved since then.
     * ``measured``: whether a measured displacement has arrived since Stop.
     """

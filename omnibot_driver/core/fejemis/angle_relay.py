@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes the line with the front wheel's angle so that the drive board can detect damage to it.
+"""Writes the front wheel's angle as a line in which the drive board can detect damage.
 
 The board must never read an angle above 90°. At such an angle, it would drive its inner wheel
 faster than the outer one.

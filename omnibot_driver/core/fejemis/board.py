@@ -317,7 +317,7 @@ class FejemisBoard(Board):
         return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
-        """Return the packets to send now: the front angle, ``start``, and those of ``Upkeep``."""
+        """Return the packets due now: the front wheel's angle, ``start``, those of ``Upkeep``."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
             text = self._relay.text(angle_rad, sums=self.with_sums)

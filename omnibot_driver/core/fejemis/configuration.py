@@ -52,8 +52,8 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers of the last reading, by the keyword of the line. A second, equal reading may not
-        have confirmed them yet."""
+        """Numbers that the board reported last, by the keyword of the line. They may still need
+        confirmation by a second, equal report."""
         self.turned = False
         """Whether the board's ``confs`` line (steering geometry) begins with the track.
 
@@ -151,8 +151,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them.
 
-        If the board has not reported them, they are the user's values, or None if the user has set
-        none. If the board's values equal the user's except for rounding, the user's are returned.
+        The user's values are returned if the board has not reported its values, or if the two are
+        equal except for rounding. None if neither the user nor the board has given values.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

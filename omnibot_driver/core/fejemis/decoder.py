@@ -41,8 +41,8 @@ class FejemisDecoder:
 
     ``changed``: whether ``sums`` has changed. The caller resets this flag.
 
-    ``doubtful``: whether ``sums`` was learnt from heartbeats, and the last line other than a
-    heartbeat contradicts it. Meanwhile, the driver's lines to the board carry no checksum.
+    ``doubtful``: True if ``sums`` was learnt from heartbeats, but the last line of another kind
+    contradicts it. While this is True, the driver's lines to the board carry no checksum.
 
     ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.
     """
@@ -52,7 +52,7 @@ class FejemisDecoder:
         self.changed = self.doubtful = self.contradicted = False
         self._held = b""
         self._cut = False
-        """Whether the beginning of the present line was discarded because the line is too long."""
+        """Whether the beginning of the current line was discarded because the line is too long."""
         self._forms = Forms()
         self.line_sums = line_sums
 

@@ -12,9 +12,10 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: numbers of lines. If, among 24 lines of one kind, this number
-do not have the learnt form, lines of this kind are no longer checked. The first number is for lines
-with a correct checksum, the second for lines without one.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum.
+
+Of 24 lines of one kind, the lines that do not have the learnt form are counted. When their number
+reaches the limit, lines of this kind are no longer checked.
 """
 OF: Final = 24
 
@@ -28,7 +29,7 @@ class Forms:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Return whether the line has the form that was learnt for its kind, and learn from it.
+        """Return whether the line has the form learnt for its kind. Then learn from the line.
 
         ``summed``: whether the line has a correct checksum.
         """

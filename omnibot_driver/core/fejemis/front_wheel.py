@@ -71,7 +71,7 @@ class FrontWheel:
 
     @property
     def stale_at(self) -> float:
-        """Time in s at which the last angle becomes too old, if no new angle arrives until then."""
+        """Time in s at which the last angle becomes too old, if no new one arrives before then."""
         return self.heard_at + OLDEST_S + 1e-6
 
     @property

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A half (each of the two Teensys, drive or front): its identity, its data streams, its silence.
+"""One half, the drive board or the front board: its identity, its data streams, its silence.
 
 If a stream does not arrive, the driver subscribes again.
 
@@ -67,9 +67,9 @@ class Half:
         self.statistics = DecoderStatistics()
         self.clock = TeensyClock()
         self.unknown_words: dict[str, None] = {}
-        """Lines from the driver that the firmware does not know, the latest last."""
+        """Lines from the driver that the firmware does not know, from the oldest to the newest."""
         self.rejected = 0
-        """How many lines from the driver the board has rejected as damaged."""
+        """Number of the driver's lines that the board has rejected as damaged."""
         self.identity: int | None = None
         self.role: Role | None = None
         """Role of the board; None while the identity is unknown, or is neither 90 nor 91."""
@@ -98,8 +98,8 @@ class Half:
     def unsure(self) -> bool:
         """Whether the board may have restarted, and so may have lost the user's settings.
 
-        This is assumed when the stream that driving requires is missing, until a newer heartbeat
-        arrives. The board's time in this heartbeat shows whether the board has restarted.
+        If the stream that driving requires is missing, a restart is assumed until the next
+        heartbeat. The board's time in that heartbeat shows whether the board has restarted.
         """
         return self._unsure_at is not None
 
@@ -127,7 +127,7 @@ class Half:
         return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
 
     def not_understood(self, now: float) -> bool:
-        """Return whether many lines were damaged or unknown in this second.
+        """Return whether more than ``MANY`` lines were damaged or unknown within the current 1 s.
 
         The caller calls this after each read.
         """
@@ -217,7 +217,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first identity at once, but another one only from two heartbeats in a row."""
+        """Accept the first identity at once; another one must be in two heartbeats in a row."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:

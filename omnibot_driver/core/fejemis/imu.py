@@ -22,9 +22,9 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit of the time between the arrivals of two successive samples, in periods.
 
-It matters if both samples are late by about a period or more. If they arrive farther apart than
-this, a sample before them was lost. If they arrive closer together, no sample was lost: both have
-waited for a stalled host.
+The limit is used if both samples are late by about a period or more. If the time between them is
+longer, a sample before them was lost. If it is shorter, no sample was lost: both have waited for a
+stalled host.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
@@ -74,7 +74,7 @@ class ImuSamples:
 
         ``next_pose_s``: time of the pose that arrived next; infinity if none has arrived yet.
 
-        ``skipped``: how many incomplete samples were left out before it.
+        ``skipped``: how many incomplete samples were left out since the previous sample.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()

@@ -19,7 +19,7 @@ Kind = Literal["gyro", "acc"]
 PERIOD_S: Final = 0.01
 # The lines carry neither time nor number. Every ``PERIOD_S``, the board sends both lines of a
 # sample in one cycle, always in the same order. Three observations show a false pair: a line of
-# another kind between its lines that usually does not come there; a long pause between its lines,
+# another kind between its lines that usually does not come there; a long time between its lines,
 # so that it waits for the next pose; the next pose, if lines are missing since the previous pose.
 # One kind of false pair remains undetected: both lines are late, but close together, and no later
 # pose is in the read.
@@ -37,16 +37,19 @@ WARY_S: Final = 1.0
 stall, the kernel's buffer may have overflowed. Lines were then lost without a silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits in s for a difference: the sum of the pauses before gyro lines, minus the sum of the
-pauses before acceleration lines. The longer pauses are between two samples. So the sign of the
-difference shows which line of a sample comes first, if its magnitude is at least ``KNOWN_S``.
-``SUREST_S``: largest magnitude that is stored."""
+"""Limits in s for a difference: the sum of the intervals before gyro lines, minus the sum of the
+intervals before acceleration lines. An interval begins at the previous line, of the other kind.
+If the difference is at least ``KNOWN_S`` in magnitude, its sign shows which line of a sample comes
+first, because the intervals between two samples are longer than those within a sample.
+``SUREST_S``: largest magnitude that is stored.
+"""
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to a pause before a gyro or acceleration line, if a line of another kind
-arrives in this pause. Such a pause is probably between two samples."""
+"""Time in s that is added to an interval before a gyro or acceleration line, if a line of another
+kind arrives in this interval. Such an interval is probably between two samples."""
 PATIENCE: Final = 60
-"""After this many pauses, it is decided which line of a sample comes first, even if the difference
-is below ``KNOWN_S``. The difference stays small if the two lines are half a period apart."""
+"""After this many intervals, it is decided which line of a sample comes first, even if the
+difference is below ``KNOWN_S``. The difference stays small if the two lines are half a period
+apart."""
 MOST: Final = 10
 """Largest magnitude of a counter that shows whether lines of another kind usually come between
 pairs (positive) or within pairs (negative). Each kind has its own counter."""
@@ -99,8 +102,8 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """Sum of the pauses before gyro lines minus those before acceleration lines, in s. If it is
-        positive, the gyro line of a sample comes first."""
+        """Sum of the intervals before gyro lines minus those before acceleration lines, in s. If it
+        is positive, the gyro line of a sample comes first."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -111,8 +114,8 @@ class ImuPairs:
         how many came within pairs."""
         self._skipped = 0
         self._silent = False
-        """Whether, since the last pose or rejected pair, a gyro or acceleration line came more than
-        ``SILENT_S`` after the one before it. New pairs are then doubtful."""
+        """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines
+        since the last pose or rejected pair. New pairs are then doubtful."""
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -252,7 +255,7 @@ class ImuPairs:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 
     def _learn(self, kind: Kind, pause_s: float, *, marked: bool) -> None:
-        """Learn which line of a sample comes first: the line with the longer pauses before it."""
+        """Learn which line of a sample comes first: the line after the longer intervals."""
         evidence_s = min(max(pause_s, 0.0), PERIOD_S) + (MARKED_S if marked else 0.0)
         self._evidence_s += evidence_s if kind == "gyro" else -evidence_s
         self._evidence_s = max(-SUREST_S, min(SUREST_S, self._evidence_s))

@@ -53,9 +53,9 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return the front wheel's new angle in rad, to relay to the drive board; None if not new.
+        """Return the front wheel's new angle in rad, which must be relayed to the drive board.
 
-        The next call returns None until another angle arrives.
+        None if no angle has arrived since the last call.
         """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad

@@ -246,8 +246,8 @@ class Jobs:
         elif after_s > UNCHANGED_S:
             self._finish(
                 False,
-                f"{job.value} failed: the offsets are unchanged: {shown}; the drive board may not"
-                " have received the command, or does not know it; call again",
+                f"{job.value} failed: the offsets are unchanged: {shown}. Either the drive board"
+                " did not receive the command, or its firmware does not know it; call again",
             )
 
     def _calibrate(self, now: float) -> None:

@@ -94,7 +94,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
     """Return the cheapest line whose checksum would reveal damage on the way to the board.
 
-    If the checksum of none would, return the cheapest line.
+    If no line has such a checksum, return the cheapest of all lines.
 
     ``signs``: the signs of speed and turn rate, as text.
     """

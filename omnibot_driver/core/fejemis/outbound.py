@@ -30,10 +30,10 @@ def lines(*texts: bytes, sums: bool) -> bytes:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum of ``text`` detects each loss of two characters of these kinds.
+    """Return whether the checksum of ``text`` detects the loss of certain pairs of characters.
 
-    The first character is a line end or a digit of the checksum. The second is ``;`` or part of a
-    number.
+    One character of such a pair is a line end or a digit of the checksum. The other character is
+    ``;`` or part of a number.
     """
     # A lost line end joins two lines. The joined line is accepted if the character whose code is
     # the sum of the second line with its prefix is lost too. So this sum must not be the code of

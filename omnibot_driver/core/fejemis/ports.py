@@ -2,7 +2,7 @@
 
 """Finds out which half is at which port, and addresses lines to the halves.
 
-A *half* is each of the two Teensys (drive or front); it is also called a board.
+A *half* is one of the two Teensys (drive or front); it is also called a board.
 An unidentified board only gets lines that stop or switch off something, and requests for its
 heartbeat.
 

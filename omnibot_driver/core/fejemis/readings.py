@@ -17,7 +17,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """A long request of the user, whose result is a JobDone.
+    """A request of the user that takes some time, and whose result is a JobDone.
 
     The value of each job is its name in service answers.
     """

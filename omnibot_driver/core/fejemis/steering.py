@@ -17,7 +17,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
+"""Smallest target angle of the front wheel, in rad, with which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """``ALIGNED_RAD``: largest deviation of the front wheel from its target angle, in rad, at which a
@@ -27,8 +27,8 @@ turn on the spot may begin. Other motion has full speed up to the same deviation
 """
 GIVEN_RAD: Final = math.radians(5.0)
 """Deviation of the front wheel from its target angle, in rad. At full speed, this deviation causes
-the largest accepted error of the body's velocity. At a larger deviation, the speed is limited, so
-that the error does not become larger than this."""
+the largest accepted error of the body's velocity. At a larger deviation, the speed is limited so
+that the error does not exceed this value."""
 
 
 @value(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Steered:
 
     ``angle_rad``: the angle that the front wheel must reach.
 
-    ``twist``: the body's motion at the present front angle.
+    ``twist``: the body's motion at the front wheel's current angle.
 
     ``whole``: whether ``part`` is 1.
     """
@@ -131,7 +131,7 @@ def _allowed(
 ) -> float:
     """Return the largest allowed rim speed of the outer wheel, in m/s; infinity without a limit.
 
-    ``angle_rad``: present angle of the front wheel. ``target_rad``: the angle that it must reach.
+    ``angle_rad``: current angle of the front wheel. ``target_rad``: the angle that it must reach.
 
     ``turning``: whether the body already turns on the spot.
     """

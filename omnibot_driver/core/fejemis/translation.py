@@ -69,7 +69,7 @@ class Translation:
         self._imu.unit = settings.acceleration_unit
 
     def connect(self) -> None:
-        """Begin a new connection: forget the front angle, wheel speeds and IMU lines.
+        """Begin a new connection: forget the front wheel's state, wheel speeds and IMU lines.
 
         The last pose and the state of the battery are kept.
         """

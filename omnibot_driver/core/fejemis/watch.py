@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Checks timeouts: a board is silent, or the last front angle or pose is too old to drive.
+"""Checks timeouts: a board is silent, or the front wheel's angle or the pose is too old.
 
 The module knows when lines came; it does not know what they contain.
 """
@@ -16,7 +16,7 @@ from omnibot_driver.core.fejemis.told import Told
 NO_POSE_S: Final = 0.25
 """Age of the last pose in s above which the robot is stopped."""
 NO_ANGLE_S: Final = 0.25
-"""Time in s without a front angle after which brush and lift are switched off."""
+"""Time in s without an angle of the front wheel, after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
 """Silence in s after which the user is notified that the board at an opened port is missing."""
@@ -83,7 +83,7 @@ class Watch:
 
     @property
     def front_unheard_at(self) -> float:
-        """Time in s at which brush and lift must be off, unless a front angle arrives earlier."""
+        """Time in s at which brush and lift must be off if no wheel angle arrives earlier."""
         front = self._ports.half("front")
         return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 

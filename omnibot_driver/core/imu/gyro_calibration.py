@@ -19,12 +19,12 @@ MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
 """Length in s of each observation while no measurement is requested."""
 GAP_S: Final = 0.2
-"""Longest allowed pause between two readings of one observation, in s."""
+"""Longest allowed time between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
 """Time in s within which a request is answered.
 
-A call of ``~/calibrate_gyro`` may take five seconds. In the remaining second, the driver writes the
-result to a file."""
+A call of ``~/calibrate_gyro`` can take at most five seconds. The time that remains is for writing
+the result to a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3

@@ -84,7 +84,7 @@ class LoisEcuBoard(Board):
 
     @property
     def mode(self) -> Mode:
-        """Present mode: nominal while reports arrive, unknown otherwise."""
+        """The mode: nominal while reports arrive, unknown otherwise."""
         return self._ecu.mode
 
     @property
@@ -321,7 +321,7 @@ class LoisEcuBoard(Board):
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Request a record. A later reading contains the record, or the reason of a failure.
+        """Request a record. A later reading contains the record, or the reason for a failure.
 
         Raises RequestRefused if the board could not complete the record, and while a terminal mode,
         or a change of mode, forbids records.

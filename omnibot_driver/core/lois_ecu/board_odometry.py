@@ -26,8 +26,8 @@ class Told:
 
     ``along_m``: distance that the middle of the axle moved, in m.
 
-    ``still``: whether both reports have the same pose. ``same_velocity``: the same for the
-    velocity.
+    ``still``: whether both reports have the same pose. ``same_velocity``: whether both have the
+    same velocity.
 
     ``speeds_mps``: speeds of the left and right rim in the later report, in m/s. None unless both
     are a whole number of RPM.

@@ -31,7 +31,7 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Tick reports that arrive within this time in s were probably read together after a pause. Only
+"""Tick reports that arrive within this time in s were probably read together, and late. Only
 the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
 """Margin in s. A tick report is certainly irregular if it is earlier than the fitted clock by more
@@ -68,7 +68,7 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """Record that the board has sent ``lines`` lines. Its clock may have stopped meanwhile."""
+        """Record that the board sent ``lines`` lines. Its clock may have stopped while it sent."""
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:

@@ -38,8 +38,11 @@ line."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""Variances in squared ticks, of the errors of three reported values: ``TICK_VARIANCE`` of a count,
-``TURN_VARIANCE`` and ``ALONG_VARIANCE`` of heading and distance in the board's odometry (0x20)."""
+"""Variances, in squared ticks, of the errors of three values that the board reports.
+
+``TICK_VARIANCE``: a tick count. ``TURN_VARIANCE``: the heading in the board's odometry (0x20).
+``ALONG_VARIANCE``: the distance in the board's odometry.
+"""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
 """Limit, in ticks, of the difference between a reported and an expected count. Above it, the wheel
@@ -65,9 +68,9 @@ SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
 speed. It is added to the effect of ``SWINGING_M``."""
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviation of the error that lost reports cause in a wheel's distance without counted
-ticks, as a fraction of what the wheel rolls in the gap. First value: at a steady speed. Second
-value: at an oscillating one."""
+"""Lost reports cause an error in a wheel's distance if its ticks are not counted. These are the
+standard deviations of the error, as a fraction of the distance that the wheel rolls meanwhile.
+First value: at a steady speed. Second value: at an oscillating one."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
 """A large correction by the board's odometry (0x20) has an error, because the filter is linear, but

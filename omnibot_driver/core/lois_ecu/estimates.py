@@ -88,7 +88,7 @@ class Estimates:
     def now(
         self, stamp_s: float, unheard_s: float, may_roll_mps: tuple[float, float]
     ) -> FusedOdometry:
-        """Return the estimate at ``stamp_s``, without effect on the next one.
+        """Return the estimate at ``stamp_s``. This call has no effect on the next estimate.
 
         ``unheard_s``: time since the filter's state, in s.
 

@@ -27,7 +27,7 @@ class FilterHistory:
         self._kept.clear()
 
     def keep(self, now: float) -> None:
-        """Store the filter's present state."""
+        """Store the filter's current state."""
         covariance = [list(row) for row in self._filter.covariance]
         self._kept.append((now, list(self._filter.mean), covariance))
 

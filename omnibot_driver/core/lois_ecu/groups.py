@@ -37,10 +37,10 @@ QUIET_S: Final = 0.05
 of lines. The board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group, as a fraction of the time since the previous group with the same
-command byte. This time is measured from marker line to marker line.
+"""Longest time between two lines of a group, as a fraction of the time since the previous group
+with the same command byte. The time since that group is measured from marker line to marker line.
 
-The longest pause is at least ``QUIET_S`` and at most ``LATE_S``.
+The longest time between two lines is at least ``QUIET_S`` and at most ``LATE_S``.
 """
 
 # Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the
@@ -78,7 +78,7 @@ class Assembler:
         self._begun_at: dict[int, float] = {}
         """Arrival time of the last marker line, by command byte."""
         self._late_s: dict[int, float] = {}
-        """Longest pause allowed within a group, in s, by command byte."""
+        """Longest allowed time between two lines of a group, in s, by command byte."""
         self._astray = False
         self._after_ticks = False
         self._appends = True
@@ -113,7 +113,7 @@ class Assembler:
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             self._record.cut_off()
-            # After a long pause, the line may belong to the next group.
+            # If the time before the line is too long, the line may belong to the next group.
             late = now - self._at > self._late_s.get(code, LATE_S)
             found: list[Timed] = self._end(now) if late else []
             if payload == MARKER and not self._may_be_minus_one(code):
@@ -151,7 +151,7 @@ class Assembler:
     # Groups
 
     def _begin(self, code: int, now: float) -> None:
-        """Begin a group, and set the longest pause that is allowed within it."""
+        """Begin a group, and set the longest allowed time between two of its lines."""
         since_s = now - self._begun_at.get(code, -math.inf)
         if since_s > QUIET_S and not self._after_ticks:  # the groups came separately
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))
@@ -197,7 +197,7 @@ class Assembler:
         return self._believed(group, now)
 
     def _end(self, now: float) -> list[Timed]:
-        """End the present group. Return it if it is complete and plausible."""
+        """End the current group. Return it if it is complete and plausible."""
         code = self._code
         if code is None:
             return []

@@ -39,7 +39,7 @@ class HeadingFilter:
     def begin_frame(self, yaw_rad: float) -> None:
         """Continue in a new odometry frame, for example after a reset of the odometry.
 
-        ``yaw_rad``: yaw of the new frame in the present frame.
+        ``yaw_rad``: yaw of the new frame in the old frame.
         """
         if self._last is not None:
             self._last = self._last[0], self._last[1] - yaw_rad

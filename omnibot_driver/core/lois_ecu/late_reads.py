@@ -2,7 +2,8 @@
 
 """Times of reports that waited in the kernel's buffer because the computer read late.
 
-They arrive together. The board's clock, in every tick report, shows when each of them was sent.
+Such reports arrive together. Every tick report contains the time of the board's clock, which shows
+when the report was sent.
 
 Input: reports and their arrival times; output: the time of each report.
 """
@@ -18,7 +19,7 @@ from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
 """Time in s. If no report arrives for this time, and then several tick reports arrive together,
-their times are corrected. Shorter delays are left to ``BoardTime``."""
+their times are corrected. ``BoardTime`` handles shorter delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
 """Factor by which the times between reports are increased. The rate of the clock is not known
@@ -36,7 +37,7 @@ class Heard:
 
 
 class LateReads:
-    """Times of the reports from one board. They never decrease, and are not after the arrival.
+    """Times of the reports from one board. They never decrease, and are never after the arrivals.
 
     ``ticks_per_revolution`` may be replaced at any time.
     """
@@ -87,7 +88,8 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the time in s of ticks.
 
-        * ``late``: whether these ticks waited, because they arrived together with later ones.
+        * ``late``: whether these ticks were read late: after more than ``LATE_S`` without reports,
+          and together with later ticks.
         * ``shown``: whether the clock shows the times between these ticks and the last ones.
         """
         last, waited, at_s = self._last, False, arrived_s
@@ -110,7 +112,8 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        Clock and counts have then begun at zero. A clock in ns also does so every 4.3 s.
+        After a restart, clock and counts begin at zero. A clock in ns also returns to zero without
+        a restart, every 4.3 s.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

@@ -22,7 +22,7 @@ END: Final = b"\n"
 LENGTH: Final = 14
 LENGTH_WITHOUT_SUM: Final = 12
 MARKER: Final = 0xFFFFFFFF
-"""Payload of the marker: the line that begins a group of lines. A group encodes one report."""
+"""Payload of a marker, which is the line that begins a group. A group encodes one report."""
 
 _SUMMED: Final = 11
 _HEX: Final = re.compile(rb":[0-9a-fA-F]+\n").fullmatch
@@ -69,9 +69,9 @@ def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
 
 
 def from_pair(left: int, right: int) -> int:
-    """Return the payload that contains two 16-bit words, signed or unsigned, the left one first.
+    """Return the payload whose high 16-bit word is ``left`` and whose low one is ``right``.
 
-    Raises FrameError if a number does not fit into 16 bits.
+    Both can be signed or unsigned. Raises FrameError if a number does not fit into 16 bits.
     """
     if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
         raise FrameError(f"{left} and {right} do not fit into two 16-bit words")

@@ -26,8 +26,8 @@ OWN_GAINS: Final = (
     " 0.04 m on average, by at most 0.16 m in nearly all drives, and by 2.2 m in one of 150. Run"
     " `calibrate step`, or set these parameters"
 )
-"""Advice if the user has not set all gains; the braces are for the names of the missing ones. The
-numbers are from 150 forward drives with the compiled firmware."""
+"""Advice if the user has not set all gains. The braces are replaced by the names of the missing
+gains. The numbers are from 150 forward drives with the compiled firmware."""
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
     "the tick counts change faster than a wheel can turn, so the driver rejects the tick reports,"
@@ -74,7 +74,7 @@ class Suspicion:
 def own_gains(settings: LoisEcuSettings) -> str:
     """Return the names of the gains that the user has not set.
 
-    The result is empty if all are set, and in duty mode.
+    The result is empty if all gains are set. In duty mode, it is always empty.
     """
     if settings.drive_mode != "rpm":
         return ""

@@ -64,7 +64,7 @@ class LoisOdometry:
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
         self._said: SetRpm | SetDuty | None = None
         self._said_at_s = -math.inf
-        """``_said``: last set-point. ``_said_at_s``: time since which it is the same."""
+        """``_said``: last set-point. ``_said_at_s``: time in s at which it last changed."""
         self.configure(settings)
         self.reset()
         self.connect()
@@ -111,7 +111,7 @@ class LoisOdometry:
         return left.rests, right.rests
 
     def reset(self) -> None:
-        """Move the origin of the odometry frame to the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's current pose."""
         for state in (X, Y, WAY, PER_WHEEL + WAY):
             self._motion.filter.forget(state, 0.0, 0.0)
         for wheel in self._motion.wheels:
@@ -252,7 +252,8 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process an odometry report, which corrects the next predictions and estimates.
 
-        It is message 0x20, or in the public firmware a message 0x12 directly after the ticks.
+        The report is message 0x20. In the public firmware, it is a message 0x12 directly after the
+        ticks.
 
         ``late_s``: how much later than usual the report arrived, in s.
         """

@@ -100,7 +100,7 @@ class SettingsWriter:
 
     @property
     def _waits(self) -> bool:
-        """Whether settings wait because the robot drives. Writing a gain resets its controller."""
+        """Whether settings wait while the robot drives: writing a gain resets its controller."""
         return self._points.driving and self._rounds >= ROUNDS
 
     @property
@@ -118,7 +118,7 @@ class SettingsWriter:
         return self._round_at_s if self._rounds_left else math.inf
 
     def begin(self, now: float) -> None:
-        """Start to write all settings: after a connection, a restart or a change of settings."""
+        """Start to write all settings, after a connection, a restart or a change of settings."""
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now

@@ -28,8 +28,8 @@ MOST_PERCENT: Final = 100
 # After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""Number of times that RPM 0/0 is sent after a Stop: before each of the next set-points, or alone
-while no set-point follows. Once would be enough, but lines may be lost."""
+"""After a Stop, RPM 0/0 is sent this number of times: directly before each of the next
+set-points, or alone while no set-point follows. Once would be enough, but lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

@@ -28,7 +28,7 @@ FARTHEST: Final = 1e5
 LATEST_S: Final = 0.3
 """Longest plausible time in s from the sending of a report to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
-"""Lowest plausible rate of the board's clock, as a fraction of real time. The rate may be below 1,
+"""Lowest plausible rate of the board's clock, as a fraction of real time. The rate can be below 1,
 because the clock of the public firmware stops while the board sends."""
 SURE_AFTER: Final = 2
 """Number of further pairs of tick reports that must show the same unit of the board's clock, before

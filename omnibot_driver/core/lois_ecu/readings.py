@@ -53,7 +53,7 @@ class RecordReading:
 
 @dataclass(frozen=True, slots=True)
 class RecordComes:
-    """Notice that the first lines of a requested record have arrived.
+    """Notification that the first lines of a requested record have arrived.
 
     The board takes up to 1.3 s to send a record.
     """
@@ -61,14 +61,17 @@ class RecordComes:
 
 @dataclass(frozen=True, slots=True)
 class RecordFailed:
-    """Notice that a requested record will not come. ``reason``: the cause, and what to do."""
+    """Notification that a requested record will not come.
+
+    ``reason``: the cause, and what to do.
+    """
 
     reason: str
 
 
 @dataclass(frozen=True, slots=True)
 class TerminalLeft:
-    """Notice that a terminal mode has ended.
+    """Notification that a terminal mode has ended.
 
     The e-stop button may have changed meanwhile. In a terminal mode, its state is not reported.
     """

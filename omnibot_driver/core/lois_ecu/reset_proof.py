@@ -98,7 +98,7 @@ class ResetProof:
                 f" ({self._before.left} and {self._before.right} ticks)"
             )
         return (
-            f"reset sent, but unconfirmed: the wheel counters were {was}, so their present values"
+            f"reset sent, but unconfirmed: the wheel counters were {was}, so their current values"
             " near zero do not prove that the board obeyed"
         )
 

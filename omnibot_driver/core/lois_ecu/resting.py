@@ -94,7 +94,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Remember an estimated speed, after ``since_s`` s without a reported speed."""
+        """Remember an estimated speed. For ``since_s`` s, the board has reported no speed."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
@@ -127,7 +127,7 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the probabilities of rest, by the number of repetitions of the last speed.
+        """Return the probabilities that the wheel is at rest, by repetitions of the last speed.
 
         Empty if the wheel surely rolls.
         """

@@ -24,7 +24,7 @@ standard deviation of the fraction of the distance that is lost because both whe
 
 
 class SizeErrors:
-    """Copies of the robot's path, each with an assumed error: of one wheel's size, or of a slip."""
+    """Copies of the robot's path, each with an assumed error: a wrong wheel size, or a slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)

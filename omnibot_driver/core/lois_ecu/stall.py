@@ -46,7 +46,8 @@ class StallWatch:
     ``settings`` may be replaced at any time.
 
     ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. This is so
-    if the repeated speed is higher than the last speed that is usual before a wheel stops.
+    if the repeated speed is higher than the speeds that the board usually repeats for a wheel at
+    rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -153,9 +154,9 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether the controller gives a wheel no power, because of its reported speed.
+        """Return whether the controller gives a wheel no power.
 
-        This speed is then not below the set-point.
+        It gives no power if the reported speed is not below the set-point.
         """
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS

@@ -18,7 +18,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which the driver sends Stop if it cannot see whether the robot is at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after a mode is written. In this time, reports of the earlier mode may still arrive."""
+"""Time in s, after a mode is written, in which reports of the earlier mode can still arrive."""
 
 
 class ModeChange:
@@ -34,7 +34,7 @@ class ModeChange:
         since then."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping: dict[str, str] = {}
-        """Changes that wait until the robot was stopped: new values of parameters, by name."""
+        """Changes that wait until the robot has been stopped: new values of parameters, by name."""
         self._stopping_since_s: float | None = None
         self.left = False
         """Whether a terminal mode has ended. The code that reads this attribute clears it."""
@@ -44,7 +44,7 @@ class ModeChange:
         self._told = None
 
     def want(self, mode: TerminalMode) -> None:
-        """Request a terminal mode. The mode of a sensor begins only after the robot was stopped."""
+        """Request a terminal mode. A sensor's mode begins only after the robot has been stopped."""
         if mode not in SENSORS:
             self._stopping.pop("terminal_mode", None)
         elif mode is not self.wanted:
@@ -55,7 +55,7 @@ class ModeChange:
     def stop_first(self, parameter: str, value: str) -> None:
         """Stop the robot, because ``parameter`` gets a new ``value``.
 
-        Motion is refused until the robot is seen at rest, or for ``UNPROVED_S``.
+        Motion is refused until the robot is seen at rest, but for at most ``UNPROVED_S``.
         """
         self._stopping[parameter], self._stopping_since_s = value, None
 

@@ -45,7 +45,7 @@ RESTARTED_TURNS_PER_S: Final = 1.0
 fall of a count that wheels can cause by rolling back. If a count falls further, the board has
 restarted."""
 SILENT_S: Final = 1.0
-"""Pause in s without tick reports. After a longer pause, counts near zero and an irregular clock
+"""Time in s without tick reports. After a longer silence, counts near zero and an irregular clock
 show a restart, even if the wheels may have rolled back to these counts."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
@@ -202,12 +202,12 @@ class Translation:
         return None if wrapped_too else age_s
 
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
-        """Return whether ``ticks``, whose counts and clock may have begun at zero, show a restart.
+        """Return whether the board has restarted, when its counts and clock may have begun at zero.
 
         A clock in ns begins at zero every 4.3 s, so a small clock value alone proves nothing. The
         board has restarted if the clock does not fit the last reports, and rolling wheels do not
-        explain the counts. After ``SILENT_S`` without ticks, the clock alone decides. If no restart
-        is shown, the odometry gets an error for a possible one.
+        explain the counts. After ``SILENT_S`` without ticks, the clock alone decides. If the result
+        is False, an error is added to the odometry, because a restart is still possible.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)

@@ -20,7 +20,7 @@ from omnibot_driver.core.lois_ecu.terminal import ModeChange
 class Upkeep:
     """Scheduler of settings, modes, records and recovery. ``due`` returns the lines to write now.
 
-    ``opened``: whether the writing of the present settings has begun.
+    ``opened``: whether the writing of the current settings has begun.
     """
 
     def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:
@@ -40,8 +40,8 @@ class Upkeep:
     def configure(self, settings: LoisEcuSettings) -> None:
         """Use new settings. Changed settings are written to the board.
 
-        Three changes first stop the robot: of the drive mode, of the duty scale in duty mode, and
-        to a sensor's terminal mode.
+        The robot is first stopped if the drive mode changes, if the duty scale changes in duty
+        mode, or if a sensor's terminal mode is requested.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:

@@ -18,8 +18,8 @@ tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 """Indices of the body's states. ``X``, ``Y``: position in m.
 
-``TURN``, ``ALONG``: what the board's odometry (0x20) should show, in m: how much farther the right
-wheel has rolled than the left one, and the distance.
+``TURN``, ``ALONG``: motion in m that the board's odometry (0x20) should show. ``TURN``: how much
+farther the right wheel has rolled than the left one. ``ALONG``: mean distance of both wheels.
 
 ``BIAS``: first of two states, the error of each wheel's speed.
 
@@ -95,8 +95,8 @@ class Wheel:
         self.course = WheelModel()
         self.rolled_to_m = 0.0
         """Distance in m that the wheel had rolled when it last certainly turned, or when a command
-        began. If the wheel is later found to be at rest since then, the distance added after this
-        is subtracted."""
+        to turn took effect. If the wheel is later found to be at rest since that time, the distance
+        added since then is subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:

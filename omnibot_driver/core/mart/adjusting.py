@@ -2,7 +2,7 @@
 
 """How the driver corrects the motors' units during a drive, and what it learns from the result.
 
-This module knows the present motion and its measured speed; it does not know how a motion begins or
+This module knows the current motion and its measured speed; it does not know how a motion begins or
 ends. The caller passes the time.
 """
 
@@ -28,11 +28,11 @@ same.
 """
 
 STARTED_M: Final = 0.01
-"""If the robot has moved this distance in m, the present units are enough to turn the motors."""
+"""If the robot has moved this distance in m, the current units are enough to turn the motors."""
 
 
 class Adjusting(Moves):
-    """The part of the pilot that adjusts the present motion to the command."""
+    """The part of the pilot that adjusts the current motion to the command."""
 
     @property
     def motor_balance(self) -> str:
@@ -99,7 +99,7 @@ class Adjusting(Moves):
         self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
 
     def _learn_standing(self) -> None:
-        """Record that the present motor units are too small to turn the motors.
+        """Record that the current motor units are too small to turn the motors.
 
         If the robot has already moved in this motion, nothing is recorded: the units were
         sufficient, and an obstacle blocks the robot.

@@ -146,9 +146,9 @@ class MartBoard(Board):
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:
-        """End the present job, such as a download, because the port has closed.
+        """End the current job, such as a download, because the port has closed.
 
-        Return the readings that are left. The job's result is one of them.
+        Return all readings that were not taken yet, among them the result of the job.
         """
         self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
         return self._pilot.take()
@@ -172,7 +172,7 @@ class MartBoard(Board):
         return readings
 
     def reset_odometry(self) -> None:
-        """Move the origin of the odometry frame to the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's current pose."""
         self._pilot.odometry.reset()
 
     # Outbound
@@ -205,7 +205,7 @@ class MartBoard(Board):
         return self.stop()
 
     def stop(self) -> Packets:
-        """Return the packets with the commands that stop the present motion."""
+        """Return the packets with the commands that stop the current motion."""
         said = self._pilot.stop_words
         return tuple((word.channel, word.request().data) for word in said)
 
@@ -231,9 +231,9 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server reports a heading of exactly zero, as it does until its first RM.
 
-        RM is the forward drive. Only before the first RM may the server's clock be set back. Later,
-        the next RM would report a wrong heading, because RM integrates the turn rate over the time
-        since the previous RM.
+        RM is the forward drive. After the first RM, the server's clock must not be set back.
+        Otherwise the next RM would report a wrong heading, because RM integrates the turn rate over
+        the time since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero
 

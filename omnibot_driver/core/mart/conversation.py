@@ -28,7 +28,10 @@ from omnibot_driver.core.mart.words import (
 from omnibot_driver.core.packets import Packets
 
 QUICKEST_S: Final = 0.1
-"""Least time in s to wait for the reply to a query or change, besides the time the server needs."""
+"""Least time in s to wait for the reply to a query, or to a command that changes a motion.
+
+The time that the server needs for the command is added.
+"""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
 """Increase of ``trip_s``, the average duration of a query, after an unanswered query.
@@ -46,9 +49,9 @@ In a disturbed network, a reply may answer an earlier query instead of the last 
 ``DISTURBED_S``: the network is regarded as disturbed for this time after the last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Urgent queries: they are sent even while a late reply to an earlier query may still come.
+"""Urgent queries. They are sent even while a late reply to an earlier query may still come.
 
-That late reply could be mistaken for the reply to the new query.
+So such a late reply could be mistaken for the reply to the new query.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
@@ -305,7 +308,7 @@ class Conversation:
     def _patience_s(self, word: Word) -> float:
         """Return how long the driver waits for the reply to ``word``, in s.
 
-        The wait is short for queries and changes, because a robot may be moving.
+        The wait is short for queries and changes of a motion, because the robot may be moving.
         """
         longest_s = 2 * self.delay_s
         if word.kind in (Kind.QUERY, Kind.CHANGE):

@@ -35,7 +35,7 @@ class CorrectedPose:
 
     ``pose``: pose at the last encoder count, in the odometry frame.
 
-    ``turn``: angle of the present or last turn on the spot.
+    ``turn``: angle of the current or last turn on the spot.
     """
 
     def __init__(self, settings: MartSettings) -> None:

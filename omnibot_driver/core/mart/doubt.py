@@ -129,7 +129,7 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the present constant heading error of computed turns, because a motion begins.
+        """Store the current constant heading error of computed turns, because a motion begins.
 
         ``heading_told`` later removes the constant error that this motion has added.
         """

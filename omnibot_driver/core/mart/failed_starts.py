@@ -14,7 +14,7 @@ from omnibot_driver.core.mart.replies import Fail
 from omnibot_driver.core.mart.states import Motion
 
 AGAIN_S: Final = 1.0
-"""Pause in s after a start that failed, before the driver tries again."""
+"""Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
 """The driver gives up after this number of starts in a row that do not turn the right wheel. Only
 starts of a backward drive (B) or a turn (R, L) are counted. Each of them may have turned the left

@@ -136,7 +136,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came before the end of a complete run, so it answers another request.
 
-        If the driver has sent a stop after this reply, to end a second run, the stop has ended the
-        first run.
+        The driver may then have sent a stop to end a possible second run. In this case, the stop
+        has ended the first run.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -68,7 +68,7 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""After a longer silence in s, a server whose stop port was hung is regarded as restarted."""
+"""Silence in s after which a server whose stop port has hung is regarded as restarted."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
@@ -180,9 +180,9 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """The start time of a controlled move that is in progress or may run again, or None.
+        """Start time of a controlled move that is in progress or may run again; None without one.
 
-        During such a move, the server reports no measurements.
+        During a controlled move, the server reports no measurements.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
@@ -211,7 +211,7 @@ class Ground:
     def _seems_present(self) -> bool:
         """Whether replies show that the server was not restarted since the last start command.
 
-        They show this if no pause between them was long enough for a restart.
+        They show this if no silence between them was long enough for a restart.
         """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
@@ -289,7 +289,7 @@ class Ground:
         return False
 
     def _require(self, word: Word) -> None:
-        """Raise AssertionError if the command is not allowed in the present state."""
+        """Raise AssertionError if the command is not allowed in the current state."""
         if not may_say(self.state, word, self.motion):
             raise AssertionError(f"{word.text} must not be sent while {self.state.value}")
 

@@ -59,7 +59,7 @@ class Health:
     ``heading_told``: kinds of motion, besides RM (forward drive), in which the server reports the
     heading.
 
-    ``heading_changes``: number of changes of the reported heading in the present motion.
+    ``heading_changes``: number of changes of the reported heading in the current motion.
 
     ``reference_fails``: number of starts of RM in a row that have failed.
 

@@ -19,9 +19,10 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that may be unanswered while no turn is measured.
+"""Limit for a relative change of the motors' units to which the server has not replied.
 
-After a larger unanswered change, the robot may turn unnoticed, so the driver stops it.
+It applies while no turn is measured: after a larger change, the robot may turn unnoticed, so the
+driver stops it.
 """
 
 
@@ -117,7 +118,7 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Time in s that an exchange takes at present, from a request to its reply.
+        """Time in s that an exchange takes now, from a request to its reply.
 
         It is estimated from the queries and the last check of the IMU.
         """

@@ -26,9 +26,9 @@ If all bytes of the file have come, a third of this time is enough.
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn. The robot is at rest while the driver waits.
 
-``RECORD_S``: for the reply to the request, plus the duration of three average queries.
+``RECORD_S``: for the reply to the request. The duration of three average queries is added.
 
-``RECORD_QUIET_S``: for each piece of the file after the first one.
+``RECORD_QUIET_S``: for each piece of the file after the first piece.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a repeatable job (REPEATED)."""
@@ -120,7 +120,7 @@ class Jobs:
         return min(self._until_s, self._piece_s)
 
     def progress(self, now: float) -> str:
-        """Return a text with the present job, its duration and the bytes received."""
+        """Return a text with the current job, its duration and the bytes received."""
         if self.job is None:
             return "none"
         limit_s = WITHIN_S.get(self.job, USUAL_S)
@@ -160,8 +160,8 @@ class Jobs:
     def next(self, now: float, *, stands: bool) -> Request | None:
         """Return the job's request if it must be sent now, else None.
 
-        ``stands``: whether measurements show that the robot is at rest. TURN_RECORD does not wait
-        for rest.
+        ``stands``: whether measurements show that the robot is at rest. Every job except
+        TURN_RECORD waits until it is.
         """
         ready = stands or self.job is Job.TURN_RECORD
         return self._request if ready and not self._waiting else None
@@ -239,7 +239,10 @@ class Jobs:
             )
 
     def cancel(self, why: str) -> None:
-        """End the job as failed, for the reason ``why``; a driver's own job ends without result."""
+        """End the job as failed, for the reason ``why``.
+
+        A job that the driver has begun by itself gives no result.
+        """
         if self.job in OWN:
             self._clear()
         elif self.job is not None:

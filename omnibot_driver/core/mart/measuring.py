@@ -63,7 +63,7 @@ class Measuring(Starts):
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
 
     def _shows_restart(self, before_rad: float | None) -> bool:
-        """Return whether the present heading is exactly zero because the server was restarted.
+        """Return whether the current heading is exactly zero because the server was restarted.
 
         A restarted server reports zero until its first forward drive (RM). A heading that only
         passes through zero was near zero before. ``before_rad``: the previous heading, or
@@ -138,7 +138,7 @@ class Measuring(Starts):
             self._switch_off.doubt()
             self._notice(
                 "robot moves, but the server knows of no motion; the driver switches the motors"
-                " off. On a server without the command MCS, it does so by a turn of 1 degree",
+                " off. If the server does not know MCS, the driver commands a turn of 1 degree",
                 halt=True,
             )
             return

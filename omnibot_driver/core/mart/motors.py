@@ -53,7 +53,7 @@ class Motors:
 
     @property
     def per_unit_mps(self) -> float:
-        """Speed in m/s that an ideal motor has with one unit, at the present battery voltage."""
+        """Speed in m/s that an ideal motor has with one unit, at the current battery voltage."""
         settings = self.settings
         return settings.speed_per_unit * self.volts / settings.nominal_volts
 
@@ -64,7 +64,7 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
-        ``seen_radps``: the measured rate of the present turn, which uses ``units``. The driver
+        ``seen_radps``: the measured rate of the current turn, which uses ``units``. The driver
         does not learn from this rate here.
         """
         lines = self.lines()

@@ -50,7 +50,7 @@ class Moves(Asking):
 
     @property
     def goal_progress(self) -> str:
-        """A text with the distance and the turn to the goal, and the number of the present move."""
+        """A text with the distance and the turn to the goal, and the number of the current move."""
         move = self._move
         if move is None:
             return "none"
@@ -106,7 +106,7 @@ class Moves(Asking):
                 self.odometry.doubt_turn(OFF_COURSE_RAD)
 
     def _learn_from(self, move: Request, now: float) -> None:
-        """Learn by how much a move that has ended goes beyond its target.
+        """Learn from a finished move by how much such moves exceed the requested distance or turn.
 
         On a good network, the driver first downloads the server's record of a turn, because this
         record is more exact than the wheel's measurement.

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The present pose and twist: a prediction from the last encoder count, with its uncertainty.
+"""The current pose and twist: a prediction from the last encoder count, with its uncertainty.
 
 This module knows poses and speeds; it does not know commands. The caller passes the time.
 """
@@ -67,7 +67,7 @@ class MartOdometry(Reckoning):
 
         They include the error of this count's time.
 
-        ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the present
+        ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the current
         controlled move, or None.
         """
         if blind_since_s is not None:

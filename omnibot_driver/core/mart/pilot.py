@@ -76,7 +76,7 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``.
 
-        A motion command or a stop cancels the present job. Exception: a repeated goal does not
+        A motion command or a stop cancels the current job. Exception: a repeated goal does not
         cancel the download of a turn's record.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
@@ -96,7 +96,7 @@ class Pilot(Hearing):
 
     @property
     def stop_words(self) -> tuple[Word, ...]:
-        """The commands that stop the present motion."""
+        """The commands that stop the current motion."""
         if self.state in (State.LOST, State.ASKING):
             return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:

@@ -2,8 +2,8 @@
 
 """The times at which queries are due, in each state of the robot's motion.
 
-A sonar query takes 55 ms, so it waits for rest. This module knows queries and states; it does not
-know the replies. The caller passes the time.
+A sonar query takes 55 ms, so it is sent only while the robot is at rest. This module knows queries
+and states; it does not know the replies. The caller passes the time.
 """
 
 import math

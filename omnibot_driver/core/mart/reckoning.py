@@ -60,7 +60,7 @@ class Reckoning(CorrectedPose):
 
     ``bend``: standard deviation of that ratio.
 
-    ``begins_in_move``: whether the odometry was reset during the present controlled move.
+    ``begins_in_move``: whether the odometry was reset during the current controlled move.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -77,7 +77,7 @@ class Reckoning(CorrectedPose):
         self.reset()
 
     def reset(self) -> None:
-        """Move the origin of the odometry frame to the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's current pose."""
         self.pose = Pose()
         self.doubt.reset()
         self.begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)

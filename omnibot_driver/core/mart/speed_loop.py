@@ -23,12 +23,12 @@ It is small, because the network may duplicate a command, which then acts twice.
 MOST_BACKWARD: Final = 5
 """Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-Backward, the driver does not notice a command that arrives twice.
+In a backward drive, the driver does not notice a command that arrives twice.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
 
-``SETTLE_S``: pause after a large change of units. ``LEARN_S``: shortest averaging window.
+``SETTLE_S``: time after a large change of units. ``LEARN_S``: shortest averaging window.
 """
 LARGE_UNITS: Final = 3
 MOST_MISSED: Final = 4
@@ -138,7 +138,7 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that neither motor turns.
 
-        ``units``: the units that both motors have; None for the present units of each motor.
+        ``units``: the units that both motors have; None for the current units of each motor.
 
         A motor with MOST_DEAD units or more is regarded as blocked: nothing is learned.
         """
@@ -311,7 +311,7 @@ class SpeedLoop(Motors):
         return self.trip_s > SLOW_TRIP_S
 
     def _clear(self, from_s: float) -> None:
-        """Begin a new window of learning at the time ``from_s``."""
+        """Begin a new averaging window at the time ``from_s``."""
         self._window_from_s = from_s
         self._window_s = 0.0
         for side in (self._right, self._left):

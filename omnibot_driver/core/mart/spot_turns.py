@@ -155,7 +155,7 @@ class SpotTurns:
             self.units = SLOW_UNITS
 
     def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
-        """Return whether the present turn may continue while this rate is commanded.
+        """Return whether the current turn may continue while this rate is commanded.
 
         ``turned_s``: time since the turn began, in s.
 

@@ -44,7 +44,7 @@ SLOW_STOP: Final = (
 NO_START_S: Final = 0.75
 """Duration in s of a controlled turn (MCR, MCL) beyond which a wheel has certainly turned.
 
-The server waits 0.6 s for a wheel to turn. After the turn, it waits 0.75 s for the robot to rest.
+The server waits 0.6 s for a wheel to turn. After the turn, it waits 0.75 s for the robot to stop.
 """
 
 
@@ -176,9 +176,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop, or None.
 
-        A doubtful reply may be the reply to an earlier request that still lacks one (``owed``). If
-        there are not more doubtful replies than such requests, the result is None. Otherwise it is
-        the last doubtful reply with a plausible value, or the last one if no value is plausible.
+        If there are at most ``owed`` doubtful replies, the result is None: all of them may be
+        missing replies to earlier requests. If there are more, the result is the last doubtful
+        reply with a plausible value, or the last one if no value is plausible.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -29,7 +29,7 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 5
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S, FROZEN_TIMES = 0.5, 3
-"""The robot is stopped if the heading is constant, because the IMU is dead or the robot is stuck.
+"""The robot is stopped if the heading is constant: the IMU may be dead, or the robot stuck.
 
 ``FROZEN_S``: the heading is constant for this time in s, plus the duration of two exchanges.
 
@@ -83,7 +83,7 @@ class Stops(Ground, ABC):
         return required_motion(self._order(now), self._settings.track_m)
 
     def _agrees(self, now: float) -> bool:
-        """Return whether the present motion fits the present command or job."""
+        """Return whether the current motion fits the current command or job."""
         motion, twist = self._wish(now)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
             return self._move is not None or self.jobs.moving or self._rescue
@@ -98,7 +98,7 @@ class Stops(Ground, ABC):
         return True
 
     def _why_stop(self, now: float) -> str:
-        """Return why the present motion must not continue, as a sentence for the user.
+        """Return why the current motion must not continue, as a sentence for the user.
 
         Return "wanted" if another motion is commanded; empty if the motion may continue.
         """
@@ -301,7 +301,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _learn_standing(self) -> None:
-        """Record that the present motor units are too small to turn the motors."""
+        """Record that the current motor units are too small to turn the motors."""
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:

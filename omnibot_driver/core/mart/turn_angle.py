@@ -17,7 +17,7 @@ NO_CORRECTION: Final = 0.0
 
 
 class TurnAngle:
-    """The angle of the present turn on the spot, or of the last one.
+    """The angle of the current turn on the spot, or of the last one.
 
     Some methods return a correction, which the caller adds to the pose's heading, in rad.
 
@@ -70,7 +70,7 @@ class TurnAngle:
         """Process the recorded angle of a turn that has ended; return the heading's correction.
 
         Return None if the angle is implausible, or if the turn is not the last motion in the
-        present odometry frame.
+        current odometry frame.
         """
         wrong_rad = told_rad - self.spun_rad
         if not self._may_be_recorded or is_of_another(wrong_rad, self.spun_rad):

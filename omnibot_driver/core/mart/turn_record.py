@@ -2,8 +2,9 @@
 
 """The angle of a controlled turn, as the server has recorded it in a file (LAST TURN).
 
-The public server never closes a sent file. It can send only about 1,000, so few are downloaded.
-This module knows the form of the file; it does not know when the file is downloaded.
+The public server never closes a file that it has sent. So it can send only about 1,000 files, and
+the driver downloads few. This module knows the form of the file; it does not know when the file is
+downloaded.
 """
 
 import re

@@ -23,9 +23,9 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s, or None for a board whose lost IMU readings are not
-      counted with it. The duration of a displacement, divided by this period, is the number of IMU
-      readings that the board has sent in that time.
+    * ``imu_period_s``: period of the IMU in s. With it, lost IMU readings are counted: the board
+      has sent one reading in each period of a displacement's duration. It is None if the IMU
+      readings themselves contain the number of lost ones (``lost``).
     """
 
     imu_period_s: float | None = None

@@ -35,7 +35,7 @@ The deviation is independent of the noise, so the squares of the two are added.
 OVERSHOOT: Final = 0.15
 """Overshoot allowed in any direction, as a fraction of the change of the set-point.
 
-No overshoot is allowed if the earlier set-point was rest.
+No overshoot is allowed if the earlier set-point was zero.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
@@ -47,7 +47,7 @@ differ by some per cent.
 CHANGING_RADPS_PER_MPS: Final = 0.4
 """Yaw rate in rad/s that is allowed for each m/s by which the set-point changes.
 
-The wheels accelerate differently.
+The robot may turn during such a change, because its wheels accelerate differently.
 """
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
@@ -64,7 +64,7 @@ def outside(
 ) -> tuple[float, float]:
     """Return how far the motion is outside the envelope, in m/s and in rad/s; <= 0: inside.
 
-    ``explained``: velocities that the set-points allow, that of the current set-point first.
+    ``explained``: velocities that the set-points allow. The first is that of the current set-point.
 
     ``heading_known``: if False, the direction of the linear velocity is not checked.
     """

@@ -16,18 +16,18 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s that a robot may take to follow a set-point. So a displacement is compared with all
-set-points that held during it, or within this time before it.
+"""Time in s that a robot needs at most to follow a set-point. So a displacement is compared with
+all set-points that were in effect during it, or within this time before it.
 
 A robot that is clearly slower than all these set-points is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of the error's limit that one displacement adds: the first for a duration of up
-to 60 ms, the second for a longer one.
+"""Largest fraction of the error's limit that one displacement adds. The second value is for
+displacements that last longer than 60 ms, the first for all others.
 
-So the error exceeds its limit only after three displacements in a row, or after two longer ones.
+So the error exceeds its limit only after three displacements in a row, or after two long ones.
 """
 
 

@@ -22,7 +22,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s for which a robot still counts as driven after its set-point has become rest."""
+"""Time in s for which a robot still counts as driven after it was commanded to stand still."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -33,9 +33,9 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time at rest, in s, which proves that a robot has obeyed Stop.
+"""Time in s for which a robot must stand still to prove that it has obeyed Stop.
 
-If it moves after that, the cause is not a lost Stop, but for example a push.
+If the robot moves later, the cause is not a lost Stop but, for example, a push.
 """
 STOPS_S: Final = 5.0
 """Time in s for which the command policy repeats Stop, by default, if the robot keeps moving."""
@@ -216,7 +216,7 @@ class MotionMonitor:
 
         While a robot is being pushed, Stop is sent at ever longer intervals.
 
-        ``begins``: whether the following error exceeds its limit. The first Stop is due only then.
+        ``begins``: whether the following error exceeds its limit. Only then is the first Stop due.
         """
         if not self._error.outside:
             self._stood_s += seconds

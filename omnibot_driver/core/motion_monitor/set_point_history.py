@@ -17,13 +17,13 @@ CommandedTwist = BodyTwist | None
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]
-"""The three values of a BodyTwist as a tuple. The monitor creates many of them, and Python creates
-tuples more quickly."""
+"""The three values of a BodyTwist as a tuple. The monitor needs many such values, and Python makes
+a tuple faster than a BodyTwist."""
 
 HELD_S: Final = 0.3
 """Time in s for which a robot may keep the full velocity of a replaced set-point.
 
-This includes the line's delay, a lost repetition, and a controller's dead time.
+This time includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
 """Time constant in s with which the velocity that a replaced set-point still allows decays. The
@@ -60,7 +60,7 @@ class SetpointHistory:
     def add(self, setpoint: CommandedTwist, at_s: float) -> None:
         """Add a set-point that holds from ``at_s`` on.
 
-        For rest, pass the object ``AT_REST`` itself, because the history recognises rest by
+        For a robot at rest, pass the object ``AT_REST`` itself: the history recognises it by
         identity.
         """
         before, self.current = self.current, setpoint

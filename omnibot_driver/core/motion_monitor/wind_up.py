@@ -22,13 +22,15 @@ At this distance, the integrators of the wheel controllers reach their limits.
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
-A single long displacement does not prove that the robot is held: it may have changed direction.
+A single long displacement does not prove that the robot is held: the robot may have changed its
+direction during this time.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
-The second is for a robot whose set-point is rest: if it is still held, it keeps its wind-up longer.
+``FORGOTTEN_AT_REST_S`` applies while the set-point is rest. It is longer, because a robot that is
+still held at that time keeps its wind-up longer.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
@@ -54,8 +56,9 @@ class WindUp:
         self._unproved_m: float | None = None
         """Distance in m by which the robot fell behind in one long displacement.
 
-        It is not part of the wind-up yet. It is added, and set to 0, if the robot is also held in
-        the next displacement. None if the robot was not held in the last displacement.
+        It is not part of the wind-up yet. If the robot is held in the next displacement too, this
+        distance is added to the wind-up, and then set to 0. None if the robot was not held in the
+        last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:

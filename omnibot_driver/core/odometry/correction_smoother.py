@@ -16,8 +16,8 @@ SPREAD_S: Final = 0.2
 class CorrectionSmoother:
     """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
-    Each step has a largest possible motion. The robot's own motion uses a part of it, and the
-    correction of ``pose`` uses at most the rest.
+    In each step, the robot can move only by a certain distance and angle. The robot's own motion
+    uses a part of them, and the correction of ``pose`` uses at most the remainder.
     """
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement. Move ``pose`` likewise, but not farther than allowed.
+        """Move ``target`` by a displacement, and ``pose`` by as much of it as is allowed.
 
         ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
         """
@@ -62,7 +62,8 @@ class CorrectionSmoother:
     def follow(self, seconds: float) -> None:
         """Move ``pose`` by the part of the correction that is due after ``seconds``.
 
-        ``move`` has used a part of the possible motion. ``pose`` moves at most by the rest.
+        ``move`` has used a part of the motion that is possible in this step. The correction uses at
+        most the remainder.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

@@ -156,7 +156,7 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """Add the uncertainty of a gap in the reports, of ``duration_s``.
+        """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
         The fastest speeds limit the motion in the gap. If the robot accelerates and brakes in time
         t with acceleration a, it deviates by at most a·t²/4 from a motion at constant speed.

@@ -24,7 +24,8 @@ from omnibot_driver.core.values import value
 LONGEST_WAIT_S: Final = 1.0
 """Longest time, in s of the board's clock, to wait for a pose that gives the heading.
 
-Afterwards, the heading of an unconfirmed pose is assumed, or 0 without any pose.
+After that, the driver assumes the heading of the last, unconfirmed pose. Without such a pose, the
+driver assumes heading 0.
 """
 LONG_GAP_S: Final = 1.0
 """Duration of lost displacements, in s, above which the next displacements wait for a pose that
@@ -33,8 +34,8 @@ POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Smallest standard deviation, in rad, at which the heading counts as unknown. The deviation
-comes from lost displacements whose motion no pose of the board has shown yet."""
+"""Smallest standard deviation of the heading, in rad, at which the heading counts as unknown. Only
+lost displacements add to it, until a pose of the board shows the lost motion."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -89,7 +90,7 @@ class Odometry:
         self.heading_assumed = False
         """Whether heading 0 was assumed because the board sent no pose."""
         self.alignments = 0
-        """Number of times that the place of the odometry frame in the board's frame has changed."""
+        """Number of times that the odometry frame was moved relative to the board's frame."""
         self._track = PoseTracker(axis_signs)
         self.configure(settings)
         self._board: Pose | None = None
@@ -115,10 +116,10 @@ class Odometry:
         )
 
     def reset(self) -> list[OdometryEstimate]:
-        """Move the origin of the odometry frame to the robot's present pose.
+        """Move the origin of the odometry frame to the robot's current pose.
 
-        Return the estimates of displacements that were still waiting for a pose. Those that waited
-        for the board's first pose are discarded.
+        Return the estimates of displacements that were still waiting for a pose. Displacements that
+        waited for the board's first pose are discarded.
         """
         self.alignments += 1
         due = []
@@ -202,8 +203,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether a pose is the first one, or shows a new frame after a suspected restart.
 
-        The pose must confirm the last doubted pose (``confirmed``). After a suspected restart, one
-        pose is enough if it fits the motion since the restart.
+        In both cases, the pose must confirm the last doubted pose (``confirmed``). Exception: after
+        a suspected restart, a pose that fits the motion since the restart is accepted at once.
         """
         if self._board is None:
             return confirmed
@@ -219,7 +220,7 @@ class Odometry:
         return confirmed and self._restarted is not None
 
     def _attach(self, told: Pose) -> list[OdometryEstimate]:
-        """Adopt a new frame of the board. The odometry continues from its present pose."""
+        """Adopt a new frame of the board. The odometry continues from its current pose."""
         self._begin_at(self._backlog.before(told))
         estimates = self._release()
         self._belief.believe(told)
@@ -327,9 +328,9 @@ class Odometry:
             self._cross(tangent.times(lost, lost, lost), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Move along a tangent (twist x time) in the board's body axes, which took ``seconds``.
+        """Add a motion that took ``seconds``: a tangent (twist x time) in the board's body axes.
 
-        ``stamped_s``: the same duration, in s, by the stamps before and after.
+        ``stamped_s``: time between the stamps before and after the motion, in s.
         """
         self._track.move(tangent, seconds, stamped_s)
         self._belief.passed(seconds)

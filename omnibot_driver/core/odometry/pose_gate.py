@@ -2,8 +2,7 @@
 
 """The gate for the board's poses: accepts a pose that is finite, reachable and as expected.
 
-An unexpected pose is accepted only if the next pose confirms it. An *open gap* is a time of lost
-displacements whose motion no accepted pose has shown yet. This module does not know what an
+An unexpected pose is accepted only if the next pose confirms it. This module does not know what an
 accepted pose changes.
 """
 

@@ -48,7 +48,7 @@ class PoseTracker:
         self.uncertainty.noise = noise
 
     def begin(self) -> None:
-        """Begin the odometry frame at the robot's present pose."""
+        """Begin the odometry frame at the robot's current pose."""
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
@@ -81,7 +81,7 @@ class PoseTracker:
         move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
     def miss(self, duration_s: float) -> None:
-        """Add the uncertainty of a gap in the reports that lasted ``duration_s``."""
+        """Add the uncertainty of a gap of ``duration_s`` in the board's reports."""
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:

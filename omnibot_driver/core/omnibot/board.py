@@ -127,7 +127,8 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """Where the last read ended, relative to the IMU frames of the stream; None if unknown.
 
-        The place follows from the bytes that are not decoded yet, which may begin an IMU frame.
+        The place is computed from the bytes that are not decoded yet, because these may be the
+        beginning of an IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -197,7 +198,7 @@ class OmniBot:
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings from the bytes still held. Called after the line was closed."""
+        """Return the readings in the bytes not yet decoded. Called after the line was closed."""
         readings = self._decode_pieces()
         found = self._decoder.flush(now)
         return readings + self._translation.readings(found, self._decoder.skipped, now)
@@ -271,5 +272,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two alternatives for the guard process: Stop, or emergency stop and then Stop."""
+        """Return the guard's packets: Stop; with a latched e-stop, emergency stop and then Stop."""
         return LAST_WORDS

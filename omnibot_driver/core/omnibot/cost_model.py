@@ -29,7 +29,7 @@ ONE_BYTE: Final = 5.5
 TWO_BYTES: Final = 8.5
 """Cost of a frame that lost or gained two bytes.
 
-It is below twice ``ONE_BYTE``, because losses cluster.
+The cost is less than twice ``ONE_BYTE``, because bytes are often lost together.
 """
 BROKEN_OFF: Final = 9.0
 """Cost of a frame whose last three or more bytes were lost in a burst."""
@@ -62,16 +62,17 @@ BAD_HEADER: Final = 0.5
 """Cost of a header within unexplained bytes. Such a header may arise by chance, or from the values
 of a gyro at rest."""
 GAP: Final = 5.0
-"""Cost of a pause of the line within a frame; the board sends a frame without a pause."""
+"""Cost of a frame whose bytes arrived with a pause between them: the board does not interrupt a
+frame."""
 BAD_TEXT: Final = 4.0
 """Cost of a complete «Paused» text within unexplained bytes. Its nine fixed bytes hardly arise by
 chance."""
 KNOWN_GAP: Final = 11.0
-"""Cost of a pause within a frame, if the line has so far paused only between frames.
+"""Cost of a frame whose bytes arrived with a pause between them, if all earlier pauses of the line
+were between frames.
 
-A pause of ``late_reads.IDLE_S`` or longer has this cost on any line.
-
-The cost is high, so only strong evidence makes the decoder accept a frame with such a pause.
+On any line, a pause of ``late_reads.IDLE_S`` or longer has this cost. The cost is high, so only
+strong evidence makes the decoder accept a frame with such a pause.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -84,7 +85,8 @@ frame."""
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
 """Cost of an IMU frame. Index: number of its words that differ much from the previous frame.
 
-A single word is most likely damaged. A shock changes several words, so more words add little.
+If only one word differs, it is most likely damaged. A shock changes several words, so the cost of
+more words is only a little higher.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an IMU frame with unusual content after another one with unusual content.
@@ -132,8 +134,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which no delta is expected, if none has arrived since the stream
-began or was damaged."""
+"""If no delta has arrived since the stream began or was damaged, a delta is expected only until
+this number of deltas is missing."""
 
 
 class Context(NamedTuple):

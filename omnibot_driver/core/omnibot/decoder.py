@@ -83,7 +83,7 @@ class FrameDecoder:
         self.skipped: list[int] = []
         """For each frame of the last call, the number of discarded bytes right before it."""
         self.at_rest = False
-        """Whether all received bytes are decoded, and the line usually pauses only between frames.
+        """Whether all received bytes are decoded, and pauses are normally only between frames.
 
         If both are true, faster code may decode the next bytes.
         """
@@ -218,7 +218,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether the last byte held may begin another frame, by the arrival times.
+        """Return whether the arrival times allow that the last byte held begins another frame.
 
         ``start``, ``length``: position and length of the last frame held. ``due``: whether another
         frame may follow this frame directly.
@@ -237,9 +237,9 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept all frames of ``walk`` except the last two, because odd bytes follow the last two.
+        """Accept the frames of ``walk`` except the last two, because the bytes after them are odd.
 
-        Always return False, for ``_walk`` to return.
+        Always return False, so that ``_walk`` can return the result of this method.
         """
         believed = len(walk.frames) - 2
         if believed > 0:

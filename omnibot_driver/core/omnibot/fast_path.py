@@ -53,7 +53,7 @@ IMU. More frames would add little."""
 
 
 class Walk:
-    """Consecutive frames from the first byte held on. No evidence speaks against these frames.
+    """Consecutive frames at the start of the held bytes. No evidence speaks against these frames.
 
     * ``ends``: the position in the bytes after each frame.
     * ``lessons``: IMU frames from which the usual scatter is learned. Each entry: number of frames
@@ -95,8 +95,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a frame follows at ``at``. If so, odd content before ``at`` is from a shock.
 
-    The result is False if the bytes after this frame cannot begin another frame. If ``at`` is the
-    end of ``held``, the result is ``closed``: whether no more bytes come.
+    If the bytes after the frame at ``at`` cannot begin another frame, the result is False. If
+    ``at`` is the end of ``held``, the result is ``closed``: whether no more bytes come.
     """
     if at == len(held):
         return closed

@@ -2,9 +2,10 @@
 
 """The pauses in which the line was idle, and whether they show where frames begin.
 
-A board pauses only between frames. Two other causes of a pause between reads are an adapter that
-collects bytes, and a computer that reads late (``late_reads``). Accepted frames show whether the
-pauses of this line are only between frames.
+A *pause* is a time in which no bytes are read; it is not the board's paused mode. A board pauses
+only between frames. Two other causes of a pause between reads are an adapter that collects bytes,
+and a computer that reads late (``late_reads``). Accepted frames show whether the pauses of this
+line are only between frames.
 
 Input: positions of bytes and times; this module does not know what a frame contains.
 """

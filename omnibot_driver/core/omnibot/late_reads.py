@@ -50,14 +50,14 @@ not waited to be read."""
 FEW_BYTES: Final = 2
 """The pace at which bytes arrive can be measured only with more bytes than this."""
 TICKS_TO_PROVE: Final = 2
-"""Number of further late ticks, after the first one, that prove lost bytes.
+"""After a first late tick, this number of further late ticks proves that bytes were lost.
 
 Each of these ticks must be in a read of its own, and be as late as the first.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Number of bytes after a frame within which the cause of a pause in the frame must be found.
 
-If they do not prove an idle line, the reader was late.
+If these bytes do not prove an idle line, the reader is assumed to have been late.
 """
 
 

@@ -29,11 +29,10 @@ POSE_PERIODS: Final = 2
 one lost pose between them."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""``CLEARLY_M``, ``TIMES``: when a pose contradicts the setting of the deltas' frame (earth or
-body).
+"""``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
 
-The sum of the deltas in the configured frame must miss the pose by more than ``CLEARLY_M``. This
-error must also be more than ``TIMES`` times the error in the other frame.
+A pose contradicts the configured frame if the sum of the deltas in this frame misses the pose by
+more than ``CLEARLY_M``, and by more than ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
@@ -77,8 +76,8 @@ class MisconfigurationChecks:
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
         """Check the configured period of the deltas. Called for each delta.
 
-        ``imus``: number of IMU frames since the previous delta, which shows the period. ``now``:
-        arrival time of the delta in s. The arrival times must confirm the period.
+        ``imus``: number of IMU frames since the previous delta. This number shows the period, and
+        the arrival times must confirm it. ``now``: arrival time of the delta in s.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:

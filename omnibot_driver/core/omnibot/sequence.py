@@ -16,11 +16,11 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Smallest difference, in s, that suggests a restart: the difference between the elapsed time and
-the time that a counter shows.
+"""If the elapsed time differs from the time that a counter shows by more than this, in s, the board
+may have restarted.
 
-The drift of the clock is added to this limit. Arrival times are wrong by up to 0.24 s if the host's
-buffer is full and every tenth byte is lost.
+The drift of the clock is added to this limit. The limit is above the largest error of the arrival
+times: 0.24 s, if the host's buffer is full and every tenth byte is lost.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and so of the time that a counter shows.
@@ -87,7 +87,7 @@ class Sequence:
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """Return what the counter of a new delta shows about lost deltas and about a restart.
 
-        ``now``: arrival in s. ``imus``: IMU frames since the previous delta.
+        ``now``: arrival time in s. ``imus``: IMU frames since the previous delta.
         """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose
@@ -128,8 +128,8 @@ class Sequence:
     def pose(self, count: int, now: float) -> Step:
         """Return what the counter of a new pose shows about lost deltas and about a restart.
 
-        ``now``: arrival in s. In the result, ``lost`` is the number of missing deltas whose motion
-        is contained in the pose.
+        ``now``: arrival time in s. In the result, ``lost`` is the number of missing deltas whose
+        motion is contained in the pose.
         """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0

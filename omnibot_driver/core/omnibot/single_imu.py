@@ -86,7 +86,8 @@ def take_single(
 ) -> ImuReading | None:
     """Return the reading of ``data`` if it is one IMU frame that was due, with usual content.
 
-    Otherwise return None and change nothing. ``now``: arrival time in s of the ``first`` bytes.
+    Otherwise return None and change nothing. ``first``: number of bytes in the first piece of
+    ``data``. ``now``: arrival time of this piece in s.
 
     If ``data`` came in pieces, the caller must have checked whether the last byte may belong to the
     next header.

@@ -44,9 +44,9 @@ FULL: Final = 4000
 """Smallest number of bytes, decoded after one read, at which the kernel's buffer of 4 KiB may have
 been full. The number is below 4096, because the decoder may keep some bytes of a read for later."""
 BEHIND_S: Final = 0.5
-"""Shortest delay in s of a read after which the next read may be late too.
+"""If a read is late by more than this time, in s, the next read may be late too.
 
-The next read is late if the board needed more time to send the bytes of that read than ``BURST_S``
+The next read is late if the board needed longer to send the bytes of the next read than ``BURST_S``
 plus twice the time between the two reads.
 """
 BURST_S: Final = 0.05

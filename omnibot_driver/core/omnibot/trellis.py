@@ -68,8 +68,8 @@ _HEADLESS: Final = {
     0xFF: ((13, cost_model.HEADER_BYTE), (8, cost_model.HEADER_BYTE), (14, cost_model.HEADER_BYTE)),
     **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
 }
-"""Possible lengths and costs of a frame that has lost one of its two header bytes, by the header
-byte that is left."""
+"""Possible lengths and costs of a frame that has lost one of its two header bytes. The key is the
+header byte that was not lost."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 _BEGINNINGS: Final = (_HEADER, _TEXT)

@@ -77,7 +77,7 @@ class SessionFigures:
     """The figures of the board, its readings and its commands.
 
     * ``skew_ppm``: how much faster the board's clock runs than the host's.
-    * ``task``: name, elapsed time and limit of the long task; or empty.
+    * ``task``: name, elapsed time and time limit of the long task; empty without a task.
     """
 
     state: str

@@ -26,8 +26,8 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Which edge of the latest points' lower hull gives the fitted clock: the one at this fraction of
-the hull's time span.
+"""The fitted clock is an edge of the latest points' lower hull: the edge at this fraction of the
+hull's time span.
 
 With a larger fraction, the clock follows recent points more closely, but jitter affects it more.
 """

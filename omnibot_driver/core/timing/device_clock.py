@@ -40,10 +40,10 @@ The previous read must also be this near to the fitted clock. Keep the value bel
 the next tick, the number would be uncertain.
 """
 LARGEST_RISE: Final = 0.02
-"""Fraction by which the step from one stamp to the next may exceed the period. If a new fit makes
-the fitted clock later, the stamps therefore approach it slowly."""
+"""Fraction by which the step from one stamp to the next may exceed the period. So the stamps
+approach the fitted clock slowly if a new fit makes this clock later."""
 SMALLEST_STEP_S: Final = 1e-6
-"""Smallest step in s between two stamps, used if the arrival times leave no more room."""
+"""Smallest step in s between two stamps, used if the arrival times do not allow a larger step."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 """Boundary of a read that ended with a complete sample."""
@@ -271,8 +271,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: upper limit, in s, for the least step from the last stamp. It leaves room for
-        the stamps of the readings after this one.
+        ``room_s``: upper limit, in s, for the least step from the last stamp, so that time is left
+        for the stamps of the later readings.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

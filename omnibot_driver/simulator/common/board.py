@@ -61,7 +61,7 @@ class SimulatedBoard(Protocol):
     def facts(self) -> Mapping[str, object]:
         """State of the robot and the board, as values that JSON can represent.
 
-        ``x_m``, ``y_m``, ``yaw_rad``: true pose relative to that at construction, yaw unwrapped.
+        ``x_m``, ``y_m``, ``yaw_rad``: true pose relative to the initial pose. The yaw is unwrapped.
         """
 
 

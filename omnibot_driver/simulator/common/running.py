@@ -63,7 +63,7 @@ class RunningBoard(ABC, Generic[B]):
     def facts(self) -> dict[str, object]:
         """The board's facts, and the numbers of dropped bytes and of faults of the lines.
 
-        The reader must hold ``lock``.
+        The caller must hold ``lock``.
         """
         met = sum((line.counts for line in self._wired.lines), Counter())
         names = dict.fromkeys(name for line in self._wired.lines for name in line.counts)

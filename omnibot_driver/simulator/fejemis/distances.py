@@ -2,8 +2,8 @@
 
 """The two distance sensors of the drive Teensy, which look forward.
 
-A wall may lie across the x axis. The sonar measures only when it is triggered. The module knows
-only the robot's pose.
+They measure the distance to a wall across the x axis, if the settings have one. The sonar measures
+only when it is triggered. The module knows only the robot's pose and the place of the wall.
 """
 
 from math import cos

@@ -131,7 +131,10 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What the Teensy sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write lines. The keys are the lines' names in the help text."""
+        """Return, for each line that the host can request, the function that writes the line.
+
+        The keys are the lines' names in the help text.
+        """
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",

@@ -78,7 +78,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # Each cycle
 
     def cycle(self) -> None:
-        """Measure the angle, stop the lift when its run time is over, and steer."""
+        """Measure the angle, stop the lift when its commanded time has passed, and steer."""
         self._measured_deg = self._measure()
         if self.hung:
             return
@@ -118,7 +118,10 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What the Teensy sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write lines. The keys are the lines' names in the help text."""
+        """Return, for each line that the host can request, the function that writes the line.
+
+        The keys are the lines' names in the help text.
+        """
         return super().items() | {
             "hbt": lambda: (
                 f"hbt {self.clock_text(4)} {self.config.number} {self.version} 0.00 1 0.011"

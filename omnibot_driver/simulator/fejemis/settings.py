@@ -25,7 +25,7 @@ class Firmware:
     ``reverse``: angle of the front wheel for driving backward. ``mirrored``: the same angle as for
     driving forward on the same curve. ``clamped``: an angle beyond ±90° stays at ±90°.
 
-    ``tilt``: ``pose`` has a fifth number.
+    ``tilt``: ``pose`` has a fifth number, the tilt.
 
     ``start_resumes``: after ``start``, the board obeys the last ``rc`` again, even one that it
     received while stopped.
@@ -38,7 +38,8 @@ class Firmware:
 
     ``says_start``: a boot ends with the line ``# Starting main loop``.
 
-    ``exact_words``: a command without numbers must be the whole line, as in related firmware.
+    ``exact_words``: a command that has no numbers is recognised only if it is the whole line, as in
+    related firmware.
     """
 
     sums: bool = True
@@ -75,7 +76,7 @@ class FejemisSettings:
 
     ``wheel_radius_scale``, ``track_scale``: true size divided by the configured size.
 
-    ``slip``: standard deviation, in m, of a wheel's random error of distance after 1 m.
+    ``slip``: standard deviation, in m, of the random distance error when a wheel rolls 1 m.
 
     ``ticks``: encoder ticks per revolution of the motor.
 
@@ -86,8 +87,8 @@ class FejemisSettings:
 
     ``sensor_zero_deg``: zero offset of the angle sensor. The factory configuration corrects it.
 
-    ``clock_ppm``: rate errors of the two clocks. ``ids``: the Teensys' numbers in heartbeats. The
-    drive Teensy comes first.
+    ``clock_ppm``: rate errors of the two clocks. ``ids``: the Teensys' numbers in heartbeats. In
+    both pairs, the value of the drive Teensy comes first.
 
     ``uptime_s``: how long the Teensys have run at construction. If longer than ``boot_s``, they
     have booted.

@@ -89,7 +89,10 @@ class Teensy(Generic[C]):
     # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write lines. The keys are the lines' names in subscriptions."""
+        """Return, for each line that the host can request, the function that writes the line.
+
+        The keys are the names that a subscription uses for the lines.
+        """
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",

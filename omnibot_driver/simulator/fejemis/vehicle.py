@@ -161,8 +161,8 @@ def wheel_speeds(
 
     In the equations, ``v`` is the speed, ``w`` the turn rate, ``theta`` the angle of the front
     wheel, ``B`` is ``base_m`` and ``f`` is ``steer_m``. Outer wheel: ``v2 = sqrt(v² + w²)`` with
-    the sign of ``v``. Inner wheel: ``v1 = v2 - v2 B / d`` with ``d = f / tan(theta) + B / 2``, but
-    at least ``B / 4``.
+    the sign of ``v``. Inner wheel: ``v1 = v2 - v2 B / d``, where ``d`` is the larger of
+    ``f / tan(theta) + B / 2`` and ``B / 4``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

@@ -282,7 +282,7 @@ class SimulatedLois:
     def _main_loop(self) -> None:
         """Run the main loop for 1 ms.
 
-        In this time, the loop completes the present pass over the timers and makes another one.
+        In this time, the loop completes the current pass over the timers and makes one more.
         """
         for _ in range(2):
             if not self._scan:

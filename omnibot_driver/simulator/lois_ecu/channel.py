@@ -16,8 +16,8 @@ TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_PER_TURN_US = 300_000
-"""Time in µs of one turn at the highest speed that can be measured, 200 RPM. From an encoder level
-that is shorter than this time / ticks per turn, the board computes no speed."""
+"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. The board does
+not compute a speed from an encoder level that is shorter than this time / edges per turn."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024
@@ -31,7 +31,7 @@ class WheelChannel:
     ``steps``: encoder edges per turn.
     ``ticks``: encoder ticks, as 0x12 reports them.
     ``open_loop``: whether a duty is commanded, not a speed.
-    ``record_left``: number of samples still to take.
+    ``record_left``: number of samples that the record in progress still needs.
     """
 
     def __init__(

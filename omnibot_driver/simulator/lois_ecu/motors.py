@@ -83,7 +83,7 @@ class Motor:
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Return by how many turns the wheel moves when the motor makes ``turns``.
+        """Return how far the wheel turns, in turns, when the motor makes ``turns`` turns.
 
         The backlash between motor and wheel absorbs the rest.
         """
@@ -156,7 +156,7 @@ class Gains:
     """Gains of the manual's speed controller.
 
     feed_forward: in percent of duty per RPM.
-    low_pass: fraction of a change of the target that is applied in each step, 0..1.
+    low_pass: fraction of the remaining change of the target that each step applies, 0..1.
     """
 
     kp: float

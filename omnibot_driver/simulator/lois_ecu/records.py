@@ -16,7 +16,7 @@ PADDING, HEADING_PADDING = 10, 0x016A
 class Recorder:
     """Recorder of one record at a time.
 
-    number: command number that requested the record in progress, or None.
+    number: number of the command that requested the record in progress, or None.
     """
 
     def __init__(self, quirks: Quirks, wheels: tuple[WheelChannel, ...]) -> None:

@@ -17,7 +17,8 @@ class Quirks:
     command numbers. Fields whose names explain themselves are not listed.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
-    odometry_stands_at_equal_speeds: the position in 0x20 stays while both integer RPMs are equal.
+    odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
+        are equal.
     velocity_may_be_nan: two ticks within one timer count divide by zero. 0x20 has NaN or infinity.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
     duty_drags_target: while a negative duty is commanded, each encoder tick lowers the wheel's RPM
@@ -30,12 +31,14 @@ class Quirks:
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
     deaf_while_sending: while the board sends, it keeps only the first character that arrives.
     deaf_while_counting: at each encoder tick, the board receives nothing for 0.2 ms.
-    button_waits_while_sending: a press stops the motors only after the present message or record.
+    button_waits_while_sending: a press stops the motors only after the message or record that the
+        board is sending.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
     terminal_mode_zeroes_correction: each 0x11 zeroes the left wheel's correction of short levels.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
-    terminal_passes_input_on: input first goes to the sensor, at its 9600 or 4800 baud.
+    terminal_passes_input_on: in a terminal mode, the board first forwards its input to the sensor,
+        at 9600 or 4800 baud.
     headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
     records_in_100_us: the samples of an RPM record are in 100 µs, not in 100 ns.
     torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
@@ -118,9 +121,9 @@ class LoisSettings:
 
     steps: nominal encoder edges per turn.
     wheel_radius_scale, track_scale: true value divided by nominal value.
-    slip: standard deviation, in m, of a wheel's random error of distance after 1 m.
+    slip: standard deviation, in m, of the random distance error when a wheel rolls 1 m.
     load_percent: standard deviation of the load from the ground, in percent of duty.
-    mark_noise: standard deviation of the distance of adjacent encoder marks, in half periods.
+    mark_noise: standard deviation of the distance between adjacent encoder marks, in half periods.
     start_latitude_deg, start_longitude_deg: position of x = y = 0. The x axis points east.
     heading_noise_deg: standard deviation of each raw heading.
     running: whether the board has already booted.

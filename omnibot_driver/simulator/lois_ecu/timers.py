@@ -11,7 +11,7 @@ ONCE, NEVER = 0xFFFE, 0xFFFF
 
 @dataclass(slots=True)
 class Timer:
-    """Period of one message, and the time at which the present period began. Both are in ms."""
+    """Period of one message, and the time at which the current period began. Both are in ms."""
 
     period_ms: int
     since_ms: int = 0

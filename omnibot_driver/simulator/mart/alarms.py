@@ -2,8 +2,8 @@
 
 """Supervision of a motion in progress, 100 times a second, as the server does it.
 
-It detects start, stop and obstacles, and ends controlled moves. This module knows motions; it does
-not know commands.
+It detects that the robot starts, stops or comes near an obstacle, and it ends controlled moves.
+This module knows motions; it does not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -149,8 +149,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    Like the server, it adds the distance of acceleration and deceleration in feet to a distance in
-    inches, which is wrong.
+    The server makes an error, and so does this function: it adds the distance of acceleration and
+    deceleration in feet to the remaining distance in inches.
     """
     if motion.kind not in _TIMED:
         return 0.0
@@ -187,9 +187,9 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels.
 
-    ``right``, ``left``: changes in units of the motor registers, of which 128 are full speed;
-    forward is positive. If one wheel would be faster than full speed, the other wheel becomes
-    slower instead.
+    ``right``, ``left``: changes in units of the motor registers; forward is positive. Full speed is
+    128 units. If one wheel would be faster, it gets full speed, and the other wheel becomes slower
+    by the excess.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

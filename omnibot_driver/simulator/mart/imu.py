@@ -11,7 +11,7 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    alive: whether the IMU is plugged in; may be set. The settings may plan further failures.
+    alive: whether the IMU is plugged in; the caller can set it. The settings can plan failures too.
     closed: whether the server has stopped using the IMU, until RST IMU or SB succeeds.
     rate_dps: turn rate of the last sample, minus the bias that the server knows.
     heading_deg: the relative heading, left positive.
@@ -46,7 +46,7 @@ class Imu:
         return self.alive and not self.closed and not self._dies_s <= now < self._returns_s
 
     def learn(self) -> None:
-        """Make the server know the present bias, as if it had measured the bias at rest."""
+        """Give the server the current bias, as if it had measured the bias at rest."""
         self._known_dps = self._bias_dps
 
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:

@@ -58,7 +58,7 @@ class Motion:
 
     watching: whether the module ``alarms`` supervises the motion.
 
-    posts: number of notices of a start or stop that no waiting thread of the server has taken yet.
+    posts: number of notices about this motion, of a start or an end, that no port has taken yet.
 
     right, left: motor registers, as the server knows them.
 

@@ -148,7 +148,7 @@ class ServerState:
         return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
 
     def clearance_in(self, *, backward: bool) -> int:
-        """Return the last reading, in inches, of the sonar that the present motion uses.
+        """Return the last reading, in inches, of the sonar that the current motion uses.
 
         -1: no reading yet, or no wall in range.
         """

@@ -2,8 +2,8 @@
 
 """The board's firmware: its modes, the 100 Hz control loop, and when each frame is sent.
 
-The same settings and input always give the same output. Comments mark what is assumed because the
-manual is silent.
+The same settings and input always give the same output. Comments mark the assumptions about points
+that the manual does not describe.
 
 This module knows the manual's state machine and control equations. It must not know ports or real
 time.
@@ -128,7 +128,7 @@ class SimulatedBoard:
         return self._odometry.reported
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Hold the robot by hand: tilt it by angles in rad, or turn it to the left, in rad/s.
+        """Hold the robot by hand: tilt it by angles in rad, and turn it left at a rate in rad/s.
 
         Only the IMU measures the tilt and the turn. The robot's true pose does not change.
         """

@@ -46,7 +46,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default="counting",
         help="how the firmware finds control frames. counting (the default): it counts seven bytes"
         " after FF FE, without a timeout. naive: like counting, but it misses the header in FF FF"
-        " FE. idle_gap: like counting, but a pause of 5 ms ends an incomplete frame. window: it"
+        " FE. idle_gap: like counting, but 5 ms without a byte end an incomplete frame. window: it"
         " accepts the last 9 bytes whenever they begin with FF FE",
     )
     parser.add_argument(

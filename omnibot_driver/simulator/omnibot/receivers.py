@@ -25,15 +25,15 @@ WAKE_UP_BYTES: Final = 3
 """Number of bytes that wake the receiver (manual, Serial Command: "Serial initialization: 3
 arbitrary byte")."""
 IDLE_GAP_S: Final = 0.005
-"""Pause after which the receiver ``idle_gap`` discards an incomplete frame, in s."""
+"""Time in s without a byte, after which the receiver ``idle_gap`` discards an incomplete frame."""
 
 FramingName = Literal["counting", "naive", "idle_gap", "window"]
 LetterPlace = Literal["between", "anywhere"]
 Command = StateLetter | ControlFrame
 # The bytes held now, the completed frame or None, and whether the byte may belong to a frame.
 Step = tuple[bytes, ControlFrame | None, bool]
-# A function that keeps no state. Arguments: the bytes held, a new byte, and the pause before the
-# new byte in s.
+# A function that keeps no state. Arguments: the bytes held, a new byte, and the time in s since the
+# byte before the new one.
 Framing = Callable[[bytes, int, float], Step]
 
 _FIRST, _SECOND = COMMAND_HEADER
@@ -63,9 +63,9 @@ def naive(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does, but discard an incomplete frame after a pause of 5 ms.
+    """Find frames as ``counting`` does, but discard an incomplete frame after 5 ms without a byte.
 
-    The pause (``IDLE_GAP_S``) is the time between two bytes.
+    This time is ``IDLE_GAP_S``.
     """
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 
@@ -73,7 +73,7 @@ def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
 def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
-    Accepted bytes are searched again, so frames may overlap.
+    Accepted bytes are searched again, so frames can overlap.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -132,7 +132,7 @@ class CommandReceiver:
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
         """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        Without ``control_frames``, each byte may act as a state letter.
+        If ``control_frames`` is false, each byte can be a state letter, but never part of a frame.
         """
         if self.to_swallow:
             self.to_swallow -= 1

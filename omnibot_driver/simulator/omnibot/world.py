@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot on the floor: how it truly moves when the motors turn.
+"""The robot on the ground: how it truly moves when the motors turn.
 
 This module knows motors, true wheel sizes, slip and the true pose. It must not know what the
 firmware assumes, commands or sends.
@@ -70,7 +70,7 @@ class Twist(NamedTuple):
 
 
 class World:
-    """The robot's three motors and the floor under them."""
+    """The robot's three motors and the ground under them."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._random = Random(f"slip {settings.seed}")
@@ -87,7 +87,7 @@ class World:
         self._slope_pwm = settings.slope_pwm
         self.held = Held()
         self.force = Force()
-        """Present force on the robot, for example from a person or from a bump in the floor."""
+        """Current force on the robot, for example from a person or from a bump in the ground."""
         self.gripped: Twist | None = None
         """Twist that a person forces on the robot against its motors; None if the robot moves
         freely."""

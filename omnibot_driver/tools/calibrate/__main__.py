@@ -20,11 +20,11 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Run the subcommand on the command line; return the exit code.
+    """Run the subcommand that the command line names; return the exit code.
 
     Exit codes: 0 success, 1 failure, 2 wrong usage, 130 interrupted.
 
-    ``argv``: the command line without the program, by default that of the process.
+    ``argv``: the arguments after the program's name; by default, those of this process.
 
     ``read``: asks the user a question and returns the answer.
     """

@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Least number of averages from which an Allan deviation is computed.
+"""Smallest number of averages from which an Allan deviation is computed.
 
 The longest averaging time is therefore one ninth of the record.
 """

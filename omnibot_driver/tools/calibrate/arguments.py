@@ -33,10 +33,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand: parameters of the driver, and what the board lacks if the driver has none.
+"""For each subcommand: driver parameters, and what the board lacks if the driver has none of them.
 
-The subcommand needs at least one of these parameters. Otherwise, the error message names what the
-board lacks.
+The subcommand needs at least one of these parameters. If there is none, the error message names
+what the board lacks.
 """
 
 
@@ -113,7 +113,7 @@ def _imu(parser: argparse.ArgumentParser) -> None:
         "--minutes",
         type=_positive,
         default=1.0,
-        help="duration of the rest in minutes (default 1). With ten or more, the result also shows"
+        help="time at rest in minutes (default 1). With ten or more, the result also shows"
         " how the bias drifts",
     )
     parser.add_argument(

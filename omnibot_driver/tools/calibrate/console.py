@@ -103,7 +103,7 @@ class Console:
         self.say(f"{what}: done")
 
     def table(self, title: str, findings: Sequence[Finding]) -> None:
-        """Print the results: each value with its uncertainty, and the driver's present value."""
+        """Print the results: each value with its uncertainty, and the driver's current value."""
         table = Table(title=title, title_justify="left", pad_edge=False)
         for heading in ("", "found", "±", "unit", "now"):
             table.add_column(heading, justify="left" if heading in ("", "unit") else "right")
@@ -125,8 +125,9 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    If the uncertainty is known, all three are rounded to the place of its second significant digit.
-    If this place is before the decimal point, they are rounded to whole numbers.
+    If the uncertainty is known, all three are rounded to the decimal place of the uncertainty's
+    second significant digit. If this place is before the decimal point, they are rounded to whole
+    numbers.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

@@ -60,7 +60,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
 
 
 def save(result: Result, output: Path, table: Table) -> None:
-    """Save the result. Raises ToolError on failure, which leaves the file unchanged."""
+    """Save the result. On failure, leave the file unchanged and raise ToolError."""
     try:
         for name, value in result.parameters.items():
             table.by_name[name].check(value)

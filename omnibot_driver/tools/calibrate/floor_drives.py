@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drives on the floor that the user measures with a tape.
+"""Drives on the ground, each of which the user measures with a tape.
 
 This module knows drives and questions; it does not know what is computed from them.
 """
@@ -42,7 +42,7 @@ def measured(
 
     ``measure``: asks the user for the end of the drive, and returns the measurement.
 
-    Raises ToolError if a drive fails, or if the user answers that there is not enough room.
+    Raises ToolError if a drive fails, or if the user answers that there is not enough space.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
@@ -57,7 +57,7 @@ def measured(
 
 
 def speeds(robot: Any, arguments: argparse.Namespace) -> tuple[float, float]:
-    """Return the user's speed in m/s and yaw rate in rad/s, reduced to the driver's limits.
+    """Return the user's choice of speed (m/s) and yaw rate (rad/s), within the driver's limits.
 
     Raises ToolError if the speed or the rate is 0.
     """

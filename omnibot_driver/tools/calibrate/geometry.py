@@ -188,7 +188,7 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first is for the present geometry. The second is for ``found``, but with three equal wheels.
+    The first is for the current geometry. The second is for ``found``, but with three equal wheels.
     """
     before: list[float] = []
     after: list[float] = []

@@ -37,7 +37,7 @@ LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCA
 class Listener(Client):
     """A client that records the robot's data in ``log``.
 
-    ``log`` has only the data of the current motion or rest.
+    ``log`` has only the data of the current motion, or of the current recording without commands.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:

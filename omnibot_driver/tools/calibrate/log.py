@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A log of the robot's data and commands during one motion or one rest.
+"""A log of the robot's data and commands in one motion, or in one recording without commands.
 
 Times are sampling times in s, by ROS's clock. This module knows rows and columns of numbers; it
 does not know ROS.

@@ -44,15 +44,17 @@ For ``cmd_vel``: a linear speed in m/s and a yaw rate in rad/s. For ``wheel_cmd`
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Limits of one motion. For ``wheel_cmd``, rad/s of a wheel replaces m/s.
+    """Limits of one motion, for the topic ``cmd_vel`` or ``wheel_cmd``.
 
-    ``speed``, ``turning``: largest commands, in m/s and rad/s.
+    ``speed``, ``turning``: largest commands, in m/s and rad/s. For ``wheel_cmd``, ``speed`` is the
+    largest wheel rate, in rad/s, and ``turning`` has no effect.
 
     ``way``, ``turn``: largest distance and turn from the start, by the odometry, in m and rad.
 
     ``seconds``: longest duration of the motion.
 
-    ``acceleration``, ``angular_acceleration``: limits in m/s² and rad/s². Infinite: no ramp.
+    ``acceleration``, ``angular_acceleration``: limits in m/s² and rad/s². Infinite: no ramp. For
+    ``wheel_cmd``, ``acceleration`` is in rad/s².
     """
 
     speed: float

@@ -34,7 +34,7 @@ SNAP_RAD: Final = math.radians(15)
 In a right-angled mounting, each axis of the IMU is parallel to an axis of the body.
 """
 HAND_RAD: Final = math.radians(2)
-"""Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
+"""Smallest assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
 """Weight of the level posture in the fit.
 
@@ -48,7 +48,8 @@ class Mounting:
 
     ``rotation``: converts from the sensor's axes to the body's axes.
 
-    ``yaw_sigma_rad``: standard deviation of the yaw, which comes from the user's inexact tilts.
+    ``yaw_sigma_rad``: standard deviation of the yaw. It is not 0, because the user tilts the robot
+    inexactly.
 
     ``tilts_rad``: angles of the tilts with the front raised and with the left side raised.
     """

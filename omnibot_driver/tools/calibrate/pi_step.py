@@ -2,7 +2,7 @@
 
 """``calibrate step`` for a board that records encoder ticks and accepts gains.
 
-1. Record steps with the present gains.
+1. Record steps with the current gains.
 2. At a constant duty, find how unequal the two levels of each encoder's signal are.
 3. Fit each plant (motor with wheel) to starts at full duty.
 4. In several rounds, compute gains, record steps, and fit the dead time for the next round.

@@ -137,7 +137,7 @@ def target_of(plant: Plant, goals: Goals) -> float:
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Return these gains with their predicted effect on a step to the speed of ``target_of``."""
+    """Return these gains, and their predicted effect on a step to the set-point ``target_of``."""
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(

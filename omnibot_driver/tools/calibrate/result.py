@@ -21,7 +21,7 @@ class Finding:
 
     ``sigma``: standard deviation of ``value``, or None if unknown.
 
-    ``before``: the driver's present value, or None.
+    ``before``: the driver's current value, or None.
     """
 
     name: str

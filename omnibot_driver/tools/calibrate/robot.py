@@ -44,7 +44,7 @@ STOOD_S: Final = 0.3
 STANDING: Final = 0.01
 """Speed in m/s, and yaw rate in rad/s, up to which the tool regards the robot as at rest."""
 UNRULY: Final = (
-    "Stop was sent, but the robot still moves or sends no odometry; cut its power, then see"
+    "Stop was sent, but the robot still moves, or no odometry arrives; cut its power, then see"
     " docs/safety.md"
 )
 
@@ -56,9 +56,10 @@ class Robot(Listener):
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """Number of commands that this node published but has not yet received back.
+        """Number of commands that this node has published but not yet received back.
 
-        The key is topic and values. A negative number shows a command of another node.
+        The key is a topic with the command's values. A negative number shows that another node
+        has published such a command.
         """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
@@ -102,9 +103,9 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the law, within the bounds, then stop it; return the log.
+        """Move the robot as ``law`` commands, within ``bounds``; then stop it. Return the log.
 
-        ``obeys``: whether a robot that does not move is an error.
+        ``obeys``: whether to raise an error if the robot does not move.
 
         ``monitored``: whether the driver's motion monitor stays on. It must be off until speed and
         direction are calibrated.

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 REST_S: Final = 2.0
 ACCELERATION: Final = 1.0
-"""Change of linear commands per s, in m/s². Commands for turns change twice as fast, in rad/s²."""
+"""Acceleration of linear commands, in m/s². That of turns, in rad/s², is twice this number."""
 GYRO_TOLERANCE: Final = 0.03
 """Relative tolerance of the gyro's scale: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0
@@ -107,7 +107,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
             " values, then run `calibrate scale` again."
         )
     notes.append(
-        "These values are based on the present `odom`. If `calibrate geometry` changes `odom`, run"
+        "These values are based on the current `odom`. If `calibrate geometry` changes `odom`, run"
         " `calibrate scale` again afterwards."
     )
     return Result(

@@ -24,8 +24,8 @@ After 1 s, the speed still differs by 0.1 %, because the board's integrator has 
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
-"""Lower limit of two estimated standard deviations: of a pose (m, rad), and of the gyro's mean rate
-(rad/s)."""
+"""Lower limit of two estimated standard deviations: that of a pose, in m or rad, and that of the
+gyro's mean rate, in rad/s."""
 CORRECTED_WITH: Final = 5
 """Number of successive odometry steps that are regarded as one independent measurement.
 
@@ -147,8 +147,8 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
     """Return the time spans of steady speed as (begin in s, end in s, command).
 
-    Spans of zero commands are omitted. A pause of the commands begins a new span, because the
-    driver may have stopped the robot.
+    Spans of zero commands are omitted. If no command was sent for more than 0.2 s
+    (``REPEATED_WITHIN_S``), a new span begins, because the driver may have stopped the robot.
     """
     commands = log.commands
     if not len(commands.stamp_s):

@@ -2,7 +2,7 @@
 
 """The picture of ``calibrate step``.
 
-It shows the measured responses, and the responses that are predicted with present and better gains.
+It shows the measured responses, and the predicted responses with the current and the better gains.
 """
 
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ def _draw_predictions(
     command: float,
     load: float,
 ) -> None:
-    """Draw each motor's predicted response with the present and with the better gains.
+    """Draw each motor's predicted response with the current and with the better gains.
 
     ``command``, ``load``: size of the step of the command, and of the simultaneous step of the
     load. A load of 1 is the effort for one count per tick.

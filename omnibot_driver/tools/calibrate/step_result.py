@@ -58,7 +58,7 @@ def result_of(found: list[WheelFound], now: Gains) -> Result:
     }
     notes = [sentence for wheel in found for sentence in _remarks(wheel)]
     notes += [
-        f"With the present gains, {_told([behaviour(motor, now) for motor in motors])}.",
+        f"With the current gains, {_told([behaviour(motor, now) for motor in motors])}.",
         f"With the better gains, {_told([behaviour(motor, better) for motor in motors])}.",
         "The driver cannot set the gains, because they are constants in the firmware.",
     ]
@@ -162,6 +162,7 @@ def _told(wheels: list[Behaviour]) -> str:
     return (
         f"a step of the command has a rise time of at most {rise_ms:.0f} ms and an overshoot of at"
         f" most {100 * overshoot:.0f} %. The integrated error is at most {command_ms:.0f} ms times"
-        f" the height of the step, and after a step of the load {load_ms:.0f} ms times its height."
+        f" the height of this step. After a step of the load, it is at most {load_ms:.0f} ms times"
+        " the height of that step."
         f" The peak of the sensitivity, Ms, is at most {ms:.2f}"
     )

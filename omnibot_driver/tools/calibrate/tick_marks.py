@@ -24,10 +24,12 @@ LARGEST: Final = 0.5
 A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""Relative error above which a time is not used. The unit is the standard deviation of all errors.
+"""A time is not used if its relative error is larger than this number of standard deviations.
+
+The standard deviation is that of all errors, estimated from their median.
 """
 EXPLAINED: Final = 0.4
-"""Least fraction of the variance that fitted marks must explain to be accepted.
+"""Fitted marks are accepted only if they explain at least this fraction of the variance.
 
 If the marks are evenly spaced, fitted marks explain less than 0.2. This was found with three
 records of two turns each.

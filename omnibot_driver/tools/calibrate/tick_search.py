@@ -54,7 +54,7 @@ lose up to 6 ms, which makes the sum smaller. If the board only noticed a mark l
 is too long and the second too short, so the sum is near 0.
 """
 SURE_TICKS: Final = 4
-"""Number of ticks at the start of a record among which the tool does not search for missed marks.
+"""The tool does not search for missed marks among this number of ticks at the start of a record.
 
 There, the wheel is still so slow that the board notices every mark.
 """
@@ -82,8 +82,8 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    ``values``: the values of a search. They contain the sum and the ratio of the time constants.
-    The constants themselves could be exchanged, and would still describe the same plant.
+    ``values``: the values of a search. They contain the sum and the ratio of the time constants
+    instead of the constants themselves, because two exchanged constants describe the same plant.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -162,7 +162,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        All later searches count two distances for a time in which a mark was missed.
+        In all later searches, a time with a missed mark covers two distances between marks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -208,7 +208,7 @@ class Search:
         self._whitener = whitener(correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
-        """Return the relative residuals at these values, without correlation and outliers."""
+        """Return the relative residuals at these values, without their correlation and outliers."""
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])

@@ -107,8 +107,9 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
         )
         if not np.isfinite(np.min(cost)):
             raise ToolError(
-                f"no gains keep Ms at most {LARGEST_MS:g} and the overshoot at most"
-                f" {LARGEST_OVERSHOOT:.0%}; repeat the measurement, with each wheel off the ground"
+                f"no gains limit the peak of the sensitivity (Ms) to {LARGEST_MS:g} and the"
+                f" overshoot to {LARGEST_OVERSHOOT:.0%}; repeat the measurement, with each wheel"
+                " off the ground"
             )
         place = np.unravel_index(np.argmin(cost), np.shape(cost))
         best = Gains(*(float(axis.flat[n]) for axis, n in zip(grid, place, strict=True)))

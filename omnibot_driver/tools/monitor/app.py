@@ -142,8 +142,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        To draw the screen again, Textual starts a new thread that reads keys. SIGSTOP does not end
-        the old thread, but entering ``suspend`` does.
+        Textual then starts a new thread that reads keys. Its old thread survives SIGSTOP and would
+        also read keys, so ``suspend`` ends the old thread first.
         """
         with self.suspend():
             pass

@@ -33,7 +33,10 @@ class Rate:
         self._seconds[-1] += 1
 
     def hz(self, now_s: float) -> float:
-        """Return the message rate in Hz, over the last 2 s or, if shorter, since ``began_s``."""
+        """Return the message rate in Hz over the last 2 s.
+
+        If ``began_s`` is less than 2 s ago, the rate is measured since ``began_s``.
+        """
         self._forget(now_s)
         span_s = min(WINDOW_S, now_s - self._began_s)
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0

@@ -51,7 +51,10 @@ class VelocityTopic:
             node.create_timer(DRIVE_EVERY_S, self._tick, clock=steady)
 
     def close(self) -> None:
-        """Stop the robot if this program has steered it. The node must not spin any more."""
+        """Stop the robot if this program has steered it.
+
+        The caller must end the spinning of the node before this call.
+        """
         if self.dead_man and self.dead_man.has_driven and self._publisher:
             self._say(HALT)
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_WITHIN_S))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drawing functions that all pictures of the report share: colours, axes, long lines."""
+"""Drawing functions that all pictures of the report share: colours, axes, lines of many points."""
 
 from typing import Final
 
@@ -21,8 +21,8 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""Largest number of points of a drawn line. Of a longer line, only the smallest and the largest
-value of each short piece are drawn."""
+"""Largest number of points of a drawn line. A line with more points is cut into short pieces, and
+only the smallest and the largest value of each piece are drawn."""
 
 
 def new_figure(height_in: float) -> Figure:

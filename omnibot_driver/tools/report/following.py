@@ -160,8 +160,8 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 def judge(log: Log) -> Iterator[Finding]:
     """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    Motion during an e-stop is reported too, and, if the log has any command, motion without a
-    command.
+    Motion during an e-stop is reported too. Motion without a command is reported only if the log
+    has at least one command.
     """
     yield from _despite_the_estop(log, twists(log))
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
@@ -219,9 +219,10 @@ def _rim_speed(pair: Pair) -> Array:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return for each of these times whether the driver did not carry out commands.
+    """Return, for each time in ``at_s``, whether the driver carried out no commands at that time.
 
-    These are times with a latched e-stop or a state that is not running, and the 0.5 s after them.
+    The driver carries out no commands while the e-stop is latched or the board does not run, and in
+    the 0.5 s after that.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [

@@ -34,7 +34,7 @@ DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
 
 Progress = Callable[[int, int], None]
-"""A function that receives how many seconds are over, and how many seconds the recording takes."""
+"""A function that receives how many seconds of the recording have passed, and how many it takes."""
 
 
 def listen(

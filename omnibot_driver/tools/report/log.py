@@ -124,8 +124,8 @@ class Log:
     def two_wheels(self) -> bool:
         """Whether the robot has two driving wheels; False without joint_states.
 
-        Among the robots with an IMU, only the Fejemis has two driving wheels. Its IMU is mounted
-        upright. The OmniBot has three driving wheels, and its IMU hangs upside down.
+        This tells the two robots with an IMU apart. The Fejemis has two driving wheels, and its IMU
+        is mounted upright. The OmniBot has three, and its IMU hangs upside down.
         """
         return len(self.wheels) == 2
 
@@ -135,7 +135,7 @@ class Log:
         return [span for span in self.estops if span.what == "latched"]
 
     def within(self, spans: list[Span], at_s: Array) -> Mask:
-        """Return for each of these times whether it lies in one of the spans."""
+        """Return, for each time in ``at_s``, whether it lies in one of the ``spans``."""
         inside = np.zeros(len(at_s), dtype=bool)
         for span in spans:
             inside |= (at_s >= span.begin_s) & (at_s < span.end_s)

@@ -39,8 +39,8 @@ LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Range of a plot of times, as a multiple of the 99 % quantile. Larger values are drawn at the
-edge."""
+"""Range of a timing plot, as a multiple of the 99 % quantile of its values. Values beyond the range
+are drawn at the edge."""
 
 
 def path(log: Log) -> Figure:

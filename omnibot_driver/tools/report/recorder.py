@@ -85,8 +85,8 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """Rows of values of a topic with one value for each wheel. Their width becomes known only
-        at the end of the recording."""
+        """Rows of values; used only if the topic has one value for each wheel. The number of wheels
+        becomes known only at the end of the recording."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -191,10 +191,9 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Return the spans of time in which the value on a topic stayed the same.
+        """Return the spans of time in which the text of a topic's value stayed the same.
 
-        ``name``: function that converts a value to a text. The text becomes the ``what`` of the
-        span.
+        ``name``: function that converts a value to a text. This text is the span's ``what``.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

@@ -160,10 +160,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return for each long step the index at which the search for compensating short steps ends.
+    """Return, for each long step, the end of the range in which short steps can compensate it.
 
-    The search begins at the long step. It covers ``most`` steps, but ends before the next long
-    step.
+    The end is the index of the first step after the range. The range begins at the long step. It
+    has ``most`` steps, or fewer if another long step comes earlier.
     ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
@@ -245,7 +245,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     if not len(rhythm.gap_s):
         yield Finding(
-            Level.GOOD, "Gaps", f"{stream.name} has no gap in the states that publish it."
+            Level.GOOD, "Gaps", f"{stream.name} has no gap in the states in which it is published."
         )
         return
     lost = int(rhythm.missing.sum())
@@ -308,7 +308,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    If a count decreases, the driver was restarted, and its new counts are added.
+    A restarted driver counts from zero again. So if a count decreases, its new value is added.
     """
     if not log.alone:
         return None

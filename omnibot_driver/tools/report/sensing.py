@@ -48,7 +48,7 @@ def rate_hz(imu: Series) -> float:
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Return for each reading whether the robot was at rest, by odometry.
+    """Return, for each IMU reading, whether the robot was at rest according to the odometry.
 
     Without odometry, blocks of 100 IMU readings are judged by their mean and spread.
     """

@@ -45,7 +45,7 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return the time in s and the three 16-bit numbers of each Stop and base velocity (mode 1).
+    """Return each Stop and base velocity (mode 1) as its time in s and its three 16-bit numbers.
 
     ``mark``: number of the first frame to look at, counted from the beginning of the test.
     """
@@ -105,7 +105,7 @@ def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> N
 def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
     """A command has values in linear.z, angular.x or angular.y.
 
-    The rest of the command is obeyed.
+    The driver sets them to zero and says so once. It obeys the other values of the command.
     """
     for _ in range(2):
         bench.session.command_twist(BodyTwist(0.4, 0.0, 0.0), bench.now, planar=False)

@@ -159,7 +159,8 @@ def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
 ) -> None:
     """The linear velocity approaches the wanted velocity along a straight line.
 
-    The yaw rate approaches independently, within its own acceleration limit.
+    Independently of this, the yaw rate approaches the wanted yaw rate, within its own acceleration
+    limit.
     """
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)

@@ -2,8 +2,8 @@
 
 """Tests of the motion rule: only a fresh command moves the robot.
 
-A command is not fresh if it is older than the timeout, or than an interruption such as a pause. The
-board must also send data. Otherwise even a fresh command does not move the robot.
+A command is fresh if it is younger than the timeout, and arrived after the last interruption, such
+as a pause of the board. If the board sends no data, even a fresh command does not move the robot.
 """
 
 import contextlib
@@ -85,9 +85,9 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The board restarts while the robot drives. The last motion frame arrives during the boot.
+    """The board restarts while the robot drives. The driver sends no motion frame after the boot.
 
-    After the boot, the board could read a byte of a motion frame as the letter S (start).
+    The board, paused after its boot, could read a byte of such a frame as the letter S (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()

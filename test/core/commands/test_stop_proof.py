@@ -27,7 +27,10 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """Deliver displacements at ``speeds``, 40 ms apart, and return whether they prove rest."""
+    """Deliver a displacement for each of ``speeds``; return whether these displacements prove rest.
+
+    ``speeds``: in m/s. The displacements arrive 40 ms apart.
+    """
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the boards' configuration: it is read, written where the user set it, and read back."""
+"""Tests of the boards' configuration: the driver reads it, and writes what the user has set."""
 
 import itertools
 
@@ -231,7 +231,7 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """The line that writes a setting is lost. Motion is refused until the board has the setting.
 
-    The driver would not repeat this line while the robot is driven.
+    The reason: while the robot is driven, the driver would not repeat this line.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

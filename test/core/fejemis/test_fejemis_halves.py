@@ -88,7 +88,8 @@ def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
     """One board restarts while the robot drives.
 
-    The robot stops, and the board is subscribed again. A new command then moves the robot.
+    The robot stops, and the driver subscribes to the board's messages again. A new command then
+    moves the robot.
     """
     bench = nominal()
     bench.drive_on()
@@ -248,9 +249,9 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
 
 
 def test_the_diagnostics_show_the_latest_unknown_lines() -> None:
-    """The drive board does not know four lines, and the first of them comes again.
+    """The drive board receives four lines that it does not know, and then the first one again.
 
-    The diagnostics show the latest three lines, each of them once.
+    The diagnostics show the latest three of these lines, each of them once.
     """
     bench = nominal()
     bench.robot.receive(b"wa\nwb\nwc\nwd\nwa\n", bench.now, DRIVE)
@@ -315,7 +316,7 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The front board's clock is ``ahead_s`` seconds ahead. Then the boards exchange their ports.
+    """The front board's clock is ahead by ``ahead_s``, in s. Then the boards exchange ports.
 
     The driver does not use the front board's clock for the stamps of the drive board.
     """

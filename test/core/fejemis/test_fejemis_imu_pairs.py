@@ -47,8 +47,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: the lines other than gyro and acceleration come with every second sample: with odd
-    sample numbers if True, with even ones if False.
+    ``odd``: all other lines come only with every second sample, with odd sample numbers if True and
+    with even ones if False.
     """
 
     order: str
@@ -179,7 +179,10 @@ def outcome(reads: list[Read]) -> Outcome:
 
 
 def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
-    """Return whether the stream shows that ``pair``, whose lines are of two samples, is false."""
+    """Return whether the stream shows that a false pair is false.
+
+    ``pair``: the numbers of the two samples that its lines belong to.
+    """
     wanted = {("gyro", pair[0]), ("acc", pair[1])}
     found = [(now, line) for now, lines in reads for line in lines]
     both = [
@@ -274,8 +277,8 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
 
-    There is one exception: lines are late, and no pose follows in the same read. Nothing in the
-    stream then shows that the two lines are of different samples.
+    There is one exception: if the lines are late and no pose follows in the same read, nothing in
+    the stream shows that the two lines are of different samples.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

@@ -136,7 +136,7 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 def test_every_message_is_understood(text: str) -> None:
     """The parser reads each example line of the manual.
 
-    It also reads a line for each kind of message of which the manual only lists the fields.
+    For some kinds of message, the manual lists only the fields. The parser reads these kinds too.
     """
     assert parse(text) == GOLDEN[text]
 
@@ -328,11 +328,11 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """Two successive windows contain 7 lines in another form each.
+    """The decoder counts the lines in another form, and begins a new count after every 24 lines.
 
-    They come at the end of the first window and at the beginning of the second. Both counts are
-    below the limit of 8, so these 14 lines are discarded. An eighth such line in the second window
-    ends the check of forms. ``windows``: the number of earlier windows without such lines.
+    At 8 lines in another form, it no longer checks the form. Here, 7 such lines are at the end of
+    one window of 24 lines, and 7 at the beginning of the next. All 14 are discarded. One more in
+    the second window is accepted. ``windows``: number of earlier windows without such lines.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

@@ -69,7 +69,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """A lift voltage waits, because another was just sent. Its time limit begins when it is sent.
+    """A lift voltage waits, because another was just sent. Its time limit begins after the wait.
 
     If the lift is switched off before that, the waiting voltage is discarded.
     """

@@ -57,7 +57,7 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The manual's example of a motion line loses two characters whose loss no checksum shows.
+    """The manual's example of a motion line loses two characters, and its checksum still fits.
 
     The board would read another motion. The driver therefore chooses other digits.
     """

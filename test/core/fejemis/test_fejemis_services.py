@@ -91,7 +91,10 @@ def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("channel", [DRIVE, FRONT])
 def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -> None:
-    """One board receives nothing, but sends its data. Loading fails, and is answered in time."""
+    """One board receives nothing, but sends its data. A request to load a configuration fails.
+
+    The request is answered within 5 s.
+    """
     bench = nominal()
     bench.run(1.5)
     bench.hears.discard(channel)
@@ -101,7 +104,10 @@ def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -
 
 
 def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() -> None:
-    """The front board does not know ``fwoi`` and says so. This shows that it receives lines."""
+    """The front board answers the query ``fwoi`` with an error, because it does not know ``fwoi``.
+
+    The error proves that the board receives lines, so the loading succeeds.
+    """
     jobs = Jobs()
     jobs.ask(Job.LOAD, None, 0.0)
     for at in (0.0, 0.5, 1.0, 1.5):

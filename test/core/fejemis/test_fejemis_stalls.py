@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of odometry after a stall of the driver, when the lines of seconds are read together."""
+"""Tests of odometry after a stall of the driver, when the lines of several seconds come at once."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -8,7 +8,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 from omnibot_driver.core.geometry.se2 import Pose
 
 READ = 4095
-"""Largest number of bytes that a read of a terminal returns, and that wait in its buffer."""
+"""Largest number of bytes that wait in a terminal's buffer. One read returns at most as many."""
 EVERYTHING = 10**6
 
 
@@ -113,9 +113,10 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 1.31, 3.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """The buffer was full during the stall, but the reads follow each other without a pause.
+    """The driver stalls, so the terminal's buffer becomes full, and later bytes are lost.
 
-    No sample is stamped with a time at which bytes were lost.
+    Afterwards, the reads follow each other without a pause. Still, no sample gets a stamp from the
+    time in which bytes were lost.
     """
     bench = nominal()
     bench.run(1.0)

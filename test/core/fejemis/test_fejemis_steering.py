@@ -114,7 +114,7 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> None:
     """A turn on the spot is commanded.
 
-    The drive board stops until the wheel is within 5° of ±90°.
+    The drive board is commanded to stop as long as the front wheel is not within 5° of ±90°.
     """
     assume(abs(w) > 0.01)
     told = steer(BodyTwist(0.0, 0.0, w), ROBOT, angle_rad, turning=False)

@@ -304,9 +304,9 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return for each published sample the cycles of its gyro and its acceleration line.
+    """Return, for each published sample, the cycles of its gyro line and its acceleration line.
 
-    A cycle is given as the bench ``numbered`` sends it: its number, divided by 1000.
+    The value for a cycle is its number divided by 1000, as in the lines from ``numbered``.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

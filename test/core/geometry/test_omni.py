@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kinematics of three omni wheels, checked with the manual's equations, which are typed by hand."""
+"""Kinematics of three omni wheels, checked with the equations of the manual."""
 
 import pytest
 from hypothesis import given
@@ -41,10 +41,10 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The body twist is computed from wheel rates with the corrected odometry matrix of the manual.
+    """The body twist is computed from wheel rates with the odometry matrix of the manual.
 
-    The factor of this matrix is 1/(2 cos 30°). The matrix that the manual prints in full is wrong
-    by a factor of 4/3.
+    The manual has two forms of this matrix. The form with the factor 1/(2 cos 30°) is right. In the
+    other form, which is multiplied out, the velocity along x is only 3/4 of the right one.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258

@@ -69,8 +69,8 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
     """The sensor and the driver are set to ranges of 2, 4, 8 or 16 g.
 
-    If the ranges differ, the driver measures a wrong gravity and advises the sensor's range. An
-    error of 8 % does not change the advice.
+    If the ranges differ, the driver measures a wrong gravity, and advises to set the sensor's
+    range. A further error of 8 % does not change the advice.
     """
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)

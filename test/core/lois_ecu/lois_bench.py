@@ -59,7 +59,7 @@ class Bench(AnyBench):
 
 
 def told(bench: Bench, kind: type) -> list[Any]:
-    """Return the values of this type in the ``Extra`` events of the session."""
+    """Return the values of type ``kind`` in the session's ``Extra`` events."""
     return [
         event.value
         for event in bench.events

@@ -178,7 +178,7 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 class Rig:
     """A simulated board and its driver, by default with ``HOST_GAINS``.
 
-    ``estimates``: all estimates of the odometry, each with the true pose.
+    ``estimates``: pairs of an estimated odometry and the robot's true pose.
 
     ``loss``: probability that a byte is lost.
 
@@ -218,7 +218,7 @@ class Rig:
         return bytes([byte for byte in data if draw() >= self._loss])
 
     def say(self, data: bytes) -> None:
-        """Send these bytes to the board, and report them to the driver as written."""
+        """Pass these bytes to the board, and inform the driver that they were written."""
         self.board.receive(self._arrived(data))
         self.driver.wrote(data, self.now)
 

@@ -38,7 +38,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the board's own gains, the right wheel stops. The board still reports its last speed.
+    """With the board's own gains, the right wheel stops. The board still reports a speed for it.
 
     The covariance fits the error of the pose. The median of three drives is checked, because a few
     drives have a larger error.
@@ -55,7 +55,8 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 ) -> None:
     """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
 
-    The odometry detects that the wheel is at rest. Otherwise, its heading would be wrong by 600°.
+    The odometry detects that the wheel is at rest. Otherwise, the estimated heading would be wrong
+    by 600°.
     """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -65,7 +66,8 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """A wheel at rest is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
 
-    A rolling wheel would slow down. So the odometry detects the standstill and adds no distance.
+    A rolling wheel would slow down from 12 RPM. So the odometry detects that the wheel is at rest,
+    and adds no distance.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -76,7 +78,7 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them(seed: int) -> None:
     """The driver reads once in 0.05 to 0.35 s. Ticks and odometry then come in the same read.
 
-    Each wheel that stops is detected. If it were not, the position would be wrong by 4 m.
+    The driver detects each wheel that stops. Otherwise, the position would be wrong by 4 m.
     """
     one = motion(wrong("firmware", seed), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -98,7 +100,7 @@ def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differ
 def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_computer(
     seed: int,
 ) -> None:
-    """The driver reads once in 0.05 to 0.35 s, so it corrects its estimate of the wheels late.
+    """The driver reads once in 0.05 to 0.35 s, so it detects late what the wheels do.
 
     The heading is then wrong by up to 30°. The covariance includes this.
     """
@@ -134,7 +136,7 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM, some ticks follow each other so soon that the firmware measures no speed at them.
+    """At 62 RPM, some ticks follow the last one so soon that the firmware measures no speed.
 
     The heading in the board's odometry (0x20) is then less accurate, so the filter adds variance to
     the yaw. At 32 RPM, it adds none.

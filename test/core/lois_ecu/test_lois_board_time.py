@@ -112,8 +112,8 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """All reads are in time. Then the board's clock jumps by 0.05 s or 0.2 s, ahead or back.
 
-    The delay that is estimated for the next tick report changes by as much, and is irregular.
-    Without the jump, it is not irregular.
+    The estimated delay of the next tick report changes by as much, and is regarded as irregular.
+    Without the jump, it is not.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -127,7 +127,7 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
     """Reads are up to 0.1 s late at random. A further read that is 0.1 s late is not irregular.
 
-    A read that seems early is irregular, because no read is early.
+    A read that seems early is irregular, because a read cannot be early.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

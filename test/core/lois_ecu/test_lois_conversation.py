@@ -161,7 +161,7 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """The firmware keeps the last measured speed of a wheel at rest, which may prevent a start.
+    """The firmware keeps the last speed of a wheel at rest, even if this prevents its next start.
 
     The driver clears this speed, so the robot starts again, also without feed-forward.
     """

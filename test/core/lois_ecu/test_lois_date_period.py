@@ -11,9 +11,9 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 class DeafBench(Bench):
-    """A bench whose board does not receive one copy of the line that sets the date period.
+    """A bench in which one of the lines that set the date period does not reach the board.
 
-    ``nth``: number of the copy that is lost, from 1. 0: none is lost.
+    ``nth``: which of these lines is lost, counted from 1; 0: none.
     """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:

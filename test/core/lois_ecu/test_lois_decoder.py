@@ -106,7 +106,7 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
     """One line of a group is damaged. The decoder drops that group.
 
-    If only the last line comes twice, the group is returned, unless it is a GPS fix.
+    If only the last line comes twice, the decoder returns the group, but it drops a GPS fix.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -272,7 +272,7 @@ def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
 def test_a_line_that_lost_its_end_costs_no_other() -> None:
     """A line has lost its line end.
 
-    The colon of the next line ends the line. So the next line is decoded.
+    The colon of the next line shows that a new line begins. So the next line is decoded.
     """
     heading = encode_report(Heading(5))
     decoder = LoisDecoder()

@@ -116,7 +116,7 @@ def test_a_record_without_end_is_not_kept() -> None:
 def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
     """Bytes are lost during drives of ten minutes. No report is wrong.
 
-    Of the reports that lost no byte, at least 85 % arrive.
+    At least 85 % of the reports that lost no byte are decoded.
     """
     sent, came, wrong = Counter[str](), Counter[str](), Counter[str]()
     for seed in range(SEEDS):

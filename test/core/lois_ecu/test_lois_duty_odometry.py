@@ -28,7 +28,7 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
     """After the board's start, the robot drives forward by duty.
 
     The public firmware counts no ticks, and its own odometry (0x20) does not change. The driver
-    does not take this for a robot at rest.
+    does not conclude that the robot is at rest.
     """
     one = by_duty([(3.0, PUSH)], seed)
     assert one.way_m > 0.7

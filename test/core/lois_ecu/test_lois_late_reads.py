@@ -29,7 +29,7 @@ def ticks(*clocks_ms: int) -> list[Report]:
 
 
 def listening(unit: ClockUnit = "ms") -> LateReads:
-    """Return a ``LateReads`` that has received clock counts of 1000 to 1800 at 1.0 to 1.8 s."""
+    """Return a ``LateReads`` that has received five tick reports on time, at 1.0 to 1.8 s."""
     late_reads = LateReads()
     for clock_ms in range(1000, 2000, PERIOD_MS):
         at_s = clock_ms / 1e3
@@ -46,13 +46,13 @@ def read(late_reads: LateReads, now: float, *reports: Report) -> tuple[float, ..
 
 
 def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows() -> None:
-    """A read is late by 0.6 s. The last report has just arrived, the others came before."""
+    """Four reports come in a read that is 0.6 s late. Each gets the time at which it arrived."""
     found = read(listening(), 2.6, *ticks(2000, 2200, 2400, 2600))
     assert found == about(2.0, 2.2, 2.4, 2.6)
 
 
 def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
-    """Five seconds pass. The read returns the reports of the first second; the rest is lost."""
+    """A read is 5 s late. The full buffer contains only the reports of the first second."""
     late_reads = listening()
     found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
     assert found[:-1] == about(2.0, 2.2, 2.4, 2.6)
@@ -100,18 +100,18 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 
 
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
-    """The board restarts during a late read, so its clock begins at zero.
+    """The board restarts while its reports wait to be read. Its clock then begins at zero.
 
-    Each later report has the time of the last report before the restart, plus its own clock.
+    The time of a later report is that of the last report before the restart plus the board's clock.
     """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)
 
 
 def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
-    """A clock in ns wraps every 4.3 s. A low clock and lower counts may show a restart or a wrap.
+    """A clock in ns is near zero after a restart of the board, and every 4.3 s, when it wraps.
 
-    It is unknown which of the two happened, so the reports have the time of the read.
+    It is unknown which of the two happened, so the reports get the time of the read.
     """
     late_reads = listening("ns")
     found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))
@@ -155,7 +155,7 @@ def stalled_drive(
 ) -> tuple[float, float]:
     """Drive, read nothing for ``stall_s``, and stand still for 3 s.
 
-    Return the distance of odom from the true position, and its standard deviation, in m.
+    Return the error of the estimated position, and its standard deviation, in m.
 
     * ``most``: number of bytes that the kernel keeps. A read returns at most ``KERNEL_BUFFER``.
     * ``during``: function that is called with the time since the beginning of the stall, in s.
@@ -255,7 +255,7 @@ def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
 def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: float) -> None:
     """The robot is at rest. Its board restarts during a stall. The pose does not change.
 
-    The board of the manual has a clock in ns, so its restart shows only in the arrival times.
+    A board as in the manual has a clock in ns, so only the arrival times show its restart.
     """
     bench = Bench("documented")
     for _ in range(14):

@@ -175,9 +175,9 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """A record of tick times ends with zeros. The value 10 fills up the channel with fewer samples.
+    """A record of tick times ends with zeros. The channel with fewer samples is padded with 10.
 
-    The decoder removes this padding.
+    The decoder removes the zeros and the padding.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)
@@ -200,9 +200,9 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """A record of headings ends with two values of 362°.
+    """After the last sample of a record of headings, the board sends two values of 362°.
 
-    It ends with three such values if this makes the number of values even.
+    It sends a third one if the number of values would otherwise be odd.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)

@@ -31,7 +31,7 @@ class Told:
             self.report(0.2, (0, 0))
 
     def report(self, after_s: float, rpm: tuple[int, int]) -> None:
-        """Report these speeds in RPM, ``after_s`` after the last report."""
+        """Pass a report of these speeds in RPM to the odometry, ``after_s`` after the last one."""
         self._now += after_s
         left, right = (one * UNIT_MPS for one in rpm)
         along, turning = (left + right) / 2, (right - left) / TRACK_M
@@ -91,8 +91,8 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
     """Most reports are lost. In the others, the speed of the right wheel is always the same.
 
-    So this wheel may be at rest. If it is, the heading is wrong. The standard deviation of the
-    heading is at least half of this error.
+    The board repeats the last speed of a wheel at rest, so this wheel may be at rest. The estimated
+    heading is then wrong. Its standard deviation is at least half of this error.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):

@@ -116,7 +116,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
     """The displacements of the estimates add up to the driven distance, within 3 %.
 
-    From one estimate to the next, the pose moves less than 3 cm plus 1 m per second.
+    From one estimate to the next, the pose moves at most 3 cm farther than at a speed of 1 m/s.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)

@@ -14,7 +14,7 @@ PERIOD_S = 0.05
 
 
 def published(board: LoisEcuBoard, now: float) -> bool:
-    """Let the time pass until ``now``, and return whether the board published odometry."""
+    """Advance the board's time to ``now``, and return whether odometry was published meanwhile."""
     return any(isinstance(reading, OdometryReading) for reading in board.elapse(now))
 
 

@@ -48,7 +48,7 @@ def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield each set of at most ``most`` lost positions in ``length`` characters."""
+    """Yield each choice of up to ``most`` of ``length`` characters, by position, to be lost."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 

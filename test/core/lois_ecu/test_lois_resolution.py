@@ -125,9 +125,9 @@ def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit)
 
 @RESOLUTIONS
 def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
-    """The counts are those of nine turns. After the reset, the wheels roll on by a quarter turn.
+    """Tick counts of nine turns are reset to zero, while the wheels roll on by a quarter turn.
 
-    The reset is proved.
+    The counts after the reset, which are near zero, still prove the reset.
     """
     proof = ResetProof(Ticks(1000, 9 * per_turn, 9 * per_turn), per_turn, steady=False)
     rolled = math.ceil(per_turn / 4)
@@ -191,8 +191,8 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
     """The user sets the resolution while the driver waits for the result of a reset.
 
-    A wheel rolls on by a quarter turn. Only with the new resolution, its count is near zero and
-    proves the reset.
+    A wheel rolls on by a quarter turn. By the new resolution, but not by the old one, its count is
+    near zero, which proves the reset.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

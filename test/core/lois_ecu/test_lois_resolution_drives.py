@@ -2,8 +2,9 @@
 
 """Drives of a simulated LOIS robot with few or many encoder ticks per turn.
 
-A simulated board measures the speeds of wheels with up to about 1000 ticks per turn. With more
-ticks, the tests command duties. The public firmware loses ticks if they are frequent.
+A simulated board can measure the speed of a wheel that has up to about 1000 ticks per turn. With
+more ticks, the tests command duties. The public firmware loses fast ticks, so its tests have at
+most 60 per turn.
 """
 
 import math

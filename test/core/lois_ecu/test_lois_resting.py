@@ -12,7 +12,7 @@ GAP_S = 0.5
 
 
 def told(*speeds_rpm: float, tuned: bool = False, every_s: float = GROUP_S) -> RestingWheel:
-    """Return a detector that has received these speeds, one with each report."""
+    """Return a detector that has received one report of each of these speeds, in this order."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
         wheel.tell(rpm, every_s, tuned=tuned)
@@ -66,7 +66,7 @@ def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The board notices a tick late. The next tick seems early: the speed is 27 RPM instead of 18.
+    """The board notices a tick late, so the next tick seems early: it reports 27 instead of 18 RPM.
 
     The 18 RPM after this single high speed are not a fall. The wheel has not stopped.
     """

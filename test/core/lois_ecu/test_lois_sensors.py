@@ -66,7 +66,7 @@ def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
 
 
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
-    """After midnight the board still has the old date, a day too early.
+    """Just after midnight, the last date from the board is that of the day before.
 
     The time is unknown until a new date arrives.
     """

@@ -192,7 +192,7 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     """Whenever the board sends a report, it receives nothing for a moment.
 
-    The driver therefore writes the settings in five rounds, each in another order, and all arrive.
+    So the driver writes all settings five times, each time in another order. Each setting arrives.
     In a fixed order, the same setting could be lost every time.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]

@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """A speed of 0.2723 m/s is sent as 20 RPM. ``meaning`` converts a line to its rounded twist."""
+    """A speed of 0.2723 m/s is sent as 20 RPM. ``meaning`` converts a line back to a twist."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))

@@ -110,7 +110,7 @@ def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> N
 def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
     """Most reports are lost, and the few others show the same speed for 3 s.
 
-    The wheel may have had other speeds in between, so more reports are needed for a stall.
+    The wheel may have had other speeds in between, so only more reports show a stall.
     """
     assert not looks_stalled([(-10, 8 + step % 3) for step in range(7)], every_s=0.5)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(10)], every_s=0.5)
@@ -178,7 +178,7 @@ def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> Non
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
     """Return the robot's velocity in m/s along the x and y axes of the odometry frame.
 
-    ``left``, ``right``: speeds of the wheels' rims in m/s. ``yaw_rad``: present heading.
+    ``left``, ``right``: speeds of the wheels' rims in m/s. ``yaw_rad``: the robot's heading.
     """
     speed = (left + right) / 2
     return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)

@@ -76,7 +76,7 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode. The first lines of the driver that end the mode may be lost.
+    """The user ends a terminal mode. The first lines that the driver sends to end it may be lost.
 
     The driver reports the end only once. It restores the "short correction", a setting of the board
     that the mode overwrote.
@@ -190,8 +190,8 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
     """In compass mode, the public firmware reads only 480 characters a second.
 
-    So while the e-stop is latched, the driver sends only Stop. Lines that it sends later still
-    arrive.
+    The driver must not send more, so it sends only Stop while the e-stop is latched. Lines that it
+    sends afterwards still arrive.
     """
     bench = Bench("firmware")
     configure(bench, COMPASS)
@@ -264,7 +264,7 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """The robot is at rest, but the driver first writes its settings, and the mode after them.
+    """The robot is at rest, but the driver must write its settings before the terminal mode.
 
     Later, after the mode was written, the board sends messages of its normal mode, so it is not in
     the terminal mode. Both times, the reason for a refusal is that the mode is changing.
@@ -283,7 +283,7 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
-    """The user sets a terminal mode, and then host again while the robot is being stopped.
+    """The user sets a terminal mode, and sets ``host`` again while the robot is being stopped.
 
     The board stays in its normal mode, so motion is allowed. The earlier motion is not continued.
     """
@@ -299,7 +299,7 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
-    """The user changes the drive mode, sets a terminal mode, and then sets host again.
+    """The user changes the drive mode, sets a terminal mode, and then sets ``host`` again.
 
     The driver still stops the robot before the other drive mode begins, and says so.
     """

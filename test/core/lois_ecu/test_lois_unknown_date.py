@@ -34,7 +34,7 @@ class GpsRig(Rig):
 
     ``dated``: whether the GPS has a date.
 
-    ``unknown``: date that the GPS sends while it has none.
+    ``unknown``: value that the GPS sends instead of a date if it has none.
 
     ``requests``: times at which the driver requested a date, in s.
     """
@@ -65,7 +65,7 @@ class GpsRig(Rig):
         return [at for at, line in self.sent if line == REQUEST]
 
     def fixes(self) -> list[bool]:
-        """Return whether each position since the last call is a fix."""
+        """Return, for each position since the last call, whether it is a fix."""
         found = [reading.valid for reading in self.readings if isinstance(reading, FixReading)]
         self.readings.clear()
         return found

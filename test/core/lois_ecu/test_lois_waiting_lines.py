@@ -74,9 +74,9 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """The LED is switched while the robot drives.
 
-    Its line follows a motion line after at least 14.5 ms. The board can lose 13 ms of bytes. With a
-    shorter distance, it could lose the end of the motion line and the beginning of the LED's line.
-    The rest could be a wrong motion line.
+    The LED's line is sent at least 14.5 ms after a motion line. The board may miss the bytes of
+    13 ms. If it missed the end of the motion line and the beginning of the LED's line, it could
+    read the remaining bytes as a wrong motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

@@ -63,7 +63,7 @@ def reach(bench: MartBench, goal: Pose) -> str:
 
 
 def yaw_error(bench: MartBench) -> float:
-    """Return the size of the error of the odometry's heading, in rad."""
+    """Return the absolute error of the odometry's heading, in rad."""
     return abs(math.remainder(bench.error.yaw_rad, math.tau))
 
 

@@ -24,7 +24,7 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    With a dead IMU or a driver that gave up, only a crash is wrong. While the driver finds out
+    If the IMU is dead or the driver has given up, only a crash is wrong. While the driver finds out
     which motion is in progress, only a crash or a hanging command port is wrong.
     """
     server, driver = world.server, world.driver

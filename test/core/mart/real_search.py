@@ -188,9 +188,9 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials in which a user commands these wishes, and one datagram has a fault.
 
-    There is one trial for each of the four faults of each datagram, in both directions. Of all
-    datagrams in one direction, only the first MOST_DATAGRAMS times the number of wishes are
-    disturbed. A run without faults first shows how many datagrams there are.
+    A first run without faults shows how many datagrams there are in each direction. Then the first
+    datagrams of a direction, at most ``MOST_DATAGRAMS`` for each wish, have each of the four faults
+    in turn.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

@@ -114,10 +114,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The ok to another command may come late, and could be taken for the ok to RST IMU.
+    """A late ok to another command could be taken for the ok to RST IMU, the check of the IMU.
 
-    So the driver delays RST IMU, the check of the IMU: such a late ok must arrive before the
-    earliest possible reply to the check.
+    So the driver sends RST IMU so late that such an ok arrives before the earliest possible reply
+    to RST IMU.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -134,8 +134,8 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     """The reply to a sonar query has not come in time, but may still come.
 
-    The driver delays another sonar query. It sends the encoder query (ENC) at once, but regards the
-    reply as doubtful.
+    The driver delays the next sonar query. It sends the encoder query (ENC) at once, but regards
+    the reply as doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -296,9 +296,9 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """After a turn, a late encoder count of 3 is taken for the angle of the turn, 3°.
+    """After a turn, a late encoder count, 3, is mistaken for the angle of the turn: 3°.
 
-    The wheel has turned farther, so the odometry uses the count of the wheel.
+    The encoder shows that the turn was larger, so the odometry does not use the 3°.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

@@ -122,9 +122,9 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects a forward drive (RM), but names the cause that ended a backward drive.
+    """The server rejects a forward drive (RM). It names the obstacle that ended a backward drive.
 
-    This cause was an obstacle. The front sonar shows no obstacle, so the driver repeats RM.
+    The front sonar shows no obstacle, so the driver repeats RM.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"

@@ -64,7 +64,7 @@ def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
 ) -> None:
     """A goal follows a drive of a heavy robot, whose wheels still turn long after the stop.
 
-    The server reports this as a failure. The driver says so once, and the robot reaches the goal.
+    The server reports this as a failure. One notice names it, and the robot reaches the goal.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     bench.command(*before, 3.0)
@@ -111,7 +111,7 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 
 @pytest.mark.slow
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
-    """An obstacle ends a move of a heavy robot early. The server reports only a long way to stop.
+    """An obstacle ends a move of a heavy robot early. The server reports only a slow stop.
 
     The driver learns nothing from this move, which was too short. The reply to the next move shows
     the obstacle. For a later goal, the driver requests the usual distance.
@@ -139,8 +139,8 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn has a wrong rate, so the driver stops it and begins it anew.
 
-    The stop takes long, or its reply is late, so the reply gives no angle. The driver learns from
-    the wheel instead, so the new turn has other motor units.
+    The stop takes long, or its reply is late, so the reply gives no angle. Instead, the driver
+    learns the motors' speed from the encoder. So the new turn has other motor units.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

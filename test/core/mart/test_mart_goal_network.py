@@ -77,7 +77,7 @@ def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
-    """Let the network deliver the next move with this command twice, the copy ``later_s`` later.
+    """Let the network deliver the next move with this command, and its copy ``later_s`` later.
 
     Return a list to which the move is added when it is sent.
     """
@@ -231,8 +231,8 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
     """No reply arrives for 0.3 s after a turn. A copy of the turn may be running.
 
-    So the driver sends a stop. Then the encoder shows a whole turn. A copy that was stopped so soon
-    would have turned less. So there was no copy, and the driver continues to the goal.
+    So the driver sends a stop. The encoder then shows the complete turn, which is more than a copy
+    could have turned before the stop. So there was no copy, and the driver continues to the goal.
     """
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot

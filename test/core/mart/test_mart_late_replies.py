@@ -30,7 +30,7 @@ def texts(bench: MartBench, since: int = 0) -> list[str]:
 
 
 def once(chosen: Callable[[bytes], bool]) -> Callable[[bytes], bool]:
-    """Return a function that is true only for the first datagram for which ``chosen`` is true."""
+    """Return a function that returns True only for the first datagram that ``chosen`` accepts."""
     seen: list[bytes] = []
 
     def first(data: bytes) -> bool:

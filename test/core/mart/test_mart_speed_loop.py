@@ -41,8 +41,8 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     """A motor turns from the first unit on, but its speed at 26 units is measured too low.
 
     A straight line through the measured speeds would show motion at zero units, which is
-    impossible. So the line of the driver shows too low a speed at 14 units. Then a higher speed is
-    measured there. This measurement must not lower the line.
+    impossible. The driver's line excludes this, and so is too low at 14 units. Then the true speed
+    is measured there, which is higher. This measurement must not lower the line.
     """
     line = MotorLine()
     for _ in range(8):

@@ -41,7 +41,7 @@ def creeping(firmware: Firmware = "source") -> MartBench:
 
 
 def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
-    """Return a function that is true for the ``number``-th datagram of this command from now on."""
+    """Return a function that returns True only for the ``number``-th such command from now on."""
     since = len(bench.written)
     return lambda data: data.startswith(word) and bench.said(since).count(data) == number
 
@@ -144,7 +144,7 @@ def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
 def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
     """A controlled turn follows a straight move at once. The driver does not switch the motors off.
 
-    The turn writes both motors, and leaves them off.
+    The turn itself sets both motors, and leaves them off at its end.
     """
     bench = MartBench("source").ready()
     since = len(bench.written)

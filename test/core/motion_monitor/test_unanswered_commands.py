@@ -75,7 +75,7 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """The user sends commands that are within the noise, then zero commands. No notice appears.
+    """The user commands 1 mm/s, which is within the noise, and then zero. No notice appears.
 
     Neither kind of command can show whether a robot obeys.
     """

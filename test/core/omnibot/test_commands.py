@@ -197,7 +197,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """A velocity that is computed back from its frame is the commanded velocity, but for rounding.
+    """Apart from rounding, the velocity that is computed back from a frame is the commanded one.
 
     Rounding changes a word by up to 0.5 LSB, and a word with a harmful byte by up to 1.5 LSB.
     """

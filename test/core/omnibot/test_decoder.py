@@ -139,7 +139,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
     """A frame is doubtful, because its last byte may begin a header.
 
-    It is returned with the first byte of the next frame, not only with the rest of that frame.
+    It is returned with the first byte of the next frame, before that frame is complete.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)

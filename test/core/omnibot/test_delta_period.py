@@ -250,7 +250,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """In place of an IMU frame and a delta come 23 damaged bytes. One lost IMU frame is counted."""
+    """23 damaged bytes come in place of an IMU frame and a delta. One lost IMU frame is counted."""
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)
     for _ in range(3):

@@ -13,7 +13,7 @@ kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
 def nominal(imus: int) -> FrameSchedule:
-    """Return a schedule after a second of nominal mode, and then ``imus`` IMU frames."""
+    """Return a schedule that has received nominal mode for 1 s, then ``imus`` more IMU frames."""
     rhythm = FrameSchedule()
     for _ in range(5):
         for _ in range(5):

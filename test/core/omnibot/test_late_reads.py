@@ -239,9 +239,9 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""For each case, the reads that bring the end of a delta, after its first two bytes.
+"""For each case, the reads that complete a delta, after its first two bytes.
 
-A read is the time in ms since the read before, and its bytes.
+Each is the time in ms since the read before it, and the bytes that are read.
 """
 
 

@@ -102,7 +102,7 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """The high byte of a goal is a letter. The nearest harmless goal could be 0.26 m away.
+    """A goal's x has a letter as its high byte. The nearest harmless goal could be 0.26 m away.
 
     So the driver refuses the goal.
     """

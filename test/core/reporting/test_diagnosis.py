@@ -262,9 +262,9 @@ def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str,
 
 
 def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
-    """A board has just begun to send data. The diagnostics do not report too low a rate.
+    """A board has just begun to send data. The diagnostics do not report that a rate is too low.
 
-    Only data of the present state is used to compute a rate.
+    They compute a rate only from data that came in the board's current state.
     """
     robot = Robot()
     robot.set(state="paused")

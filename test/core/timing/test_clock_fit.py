@@ -66,9 +66,9 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """One read in twenty is late, so the lower bound from it is too high.
+    """Every twentieth read is late, so its lower bound is too high.
 
-    This bound does not raise the fitted line.
+    These bounds do not raise the fitted line.
     """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
@@ -81,7 +81,7 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For seconds, reads are slightly late, so their lower bounds contradict the upper ones.
+    """For 4 s, reads are slightly late, so their lower bounds contradict the upper ones.
 
     The fit discards these lower bounds, because upper bounds always hold.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the sum of all delays from sampling to reading. Only measurements may add to it."""
+"""Tests of the sum of all delays from sampling to reading. A text or a pause adds nothing."""
 
 import pytest
 from session_bench import TICK_S, Bench

@@ -42,7 +42,7 @@ class Stamped:
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
         """Return the stamps minus the true sampling times, in s.
 
-        The samples before ``since_s`` after the board's start are left out.
+        The samples of the first ``since_s`` seconds after the board's start are left out.
         """
         return [
             stamp_s - self.board.sampled_at(tick)
@@ -51,7 +51,7 @@ class Stamped:
         ]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Return the RMS deviation from 10 ms of the time between two stamps, in s."""
+        """Return by how much the steps between stamps deviate from 10 ms (RMS), in s."""
         return math.sqrt(
             fmean(
                 (after[1] - before[1] - 0.01) ** 2
@@ -129,7 +129,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 ) -> None:
     """An adapter sends every 16 ms, while the board's tick is 10 ms. The stamps are right.
 
-    From the arrival times alone, a delay of 0.8 ms could remain hidden for seconds.
+    If the clock used only arrival times, its stamps could be 0.8 ms late for seconds.
     """
     stamped = run(Board(seconds=90, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3

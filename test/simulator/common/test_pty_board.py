@@ -57,7 +57,7 @@ def all_of(port: int) -> Iterator[bytes]:
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """No program reads the terminal.
 
-    The board continues, and the terminal keeps only the oldest bytes. These may be more than
+    The board continues, and the terminal keeps only the oldest bytes. These can be more than
     ``UNREAD_LIMIT``, because a busy kernel counts bytes late.
     """
     with PtyBoard(Ticker()) as pty:

@@ -127,7 +127,7 @@ def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
 
 
 def test_datagram_channels_stand_on_ports_in_a_row() -> None:
-    """The channels of a board have UDP ports in a row, only on the loopback address.
+    """The channels of a board have consecutive UDP ports, only on the loopback address.
 
     A user can choose the first port.
     """
@@ -144,7 +144,7 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
 
 
 def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
-    """A UDP port is in use or impossible. One sentence names the ports and says what to do."""
+    """A UDP port is in use or impossible. The error message names the ports and says what to do."""
     with closing(open_sockets(1)[0]) as taken:
         number = place(taken.address)[1]
         with pytest.raises(OSError, match=rf"UDP port {number} \(Address already in use\)"):

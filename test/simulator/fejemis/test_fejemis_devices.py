@@ -9,7 +9,7 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """``brush`` switches the brush. At 6 V, the lift takes 12 s from end to end.
+    """``brush`` turns the brush on or off. At 6 V, the lift takes 12 s from end to end.
 
     The lift stops after the time in ``motv``, or at 0 V.
     """
@@ -47,7 +47,7 @@ def test_the_band_and_single_leds() -> None:
 def test_distances_to_a_wall() -> None:
     """All sensors measure the distance to a wall at 0.5 m.
 
-    Without a wall, the sonar reports 0, and the others the end of their range.
+    Without a wall, the sonar reports 0. The other sensors report the end of their range.
     """
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]

@@ -111,7 +111,7 @@ def test_the_front_half_does_not_know_stop_and_start(text: str) -> None:
 def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
     """The host sends ``!stop``.
 
-    Newer firmware obeys and confirms it. For older firmware it is unknown.
+    Newer firmware obeys and confirms it. Older firmware reports an unknown command.
     """
     newer = Rig(firmware=Firmware(sums=False, confirms=True)).booted()
     assert newer.ask(DRIVE, "!stop") == ["confirm !stop"]
@@ -182,7 +182,7 @@ def test_help_is_a_flood_of_text_without_comment_marks() -> None:
 def test_a_line_of_more_than_200_characters_is_cut() -> None:
     """A line has more than 200 characters.
 
-    The rest of the line is read as a new one, here ``stop``.
+    The characters after the first 200 are read as a new line, here ``stop``.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "x" * 200 + "stop")

@@ -39,7 +39,7 @@ def test_it_echoes_it_at_any_voltage(volts: float) -> None:
 def test_tf_24_slow_runs_at_normal_speed() -> None:
     """In TF 24 SLOW (drive 24 inches), the speed word comes after the distance.
 
-    The server ignores it and drives at normal speed.
+    The server ignores this word and drives at normal speed.
     """
     fast, normal, slow = Rig(), Rig(), Rig()
     assert fast.ask("TF 24 SLOW") == normal.ask("TF NORMAL 24") == "ok 24"
@@ -86,7 +86,7 @@ def test_a_negative_distance_is_refused() -> None:
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     """The distance of a move is zero or a word. On the public server, the move has no limit.
 
-    With this quirk off, the server refuses the move.
+    If this quirk is switched off, the server refuses the move.
     """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
@@ -164,7 +164,7 @@ def test_tf_dock_stops_at_the_dock() -> None:
 def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
     """TFSFC sets the obstacle clearance of the next straight move (TF) only.
 
-    For the move after that it is 19 inches again.
+    For the move after that, the clearance is 19 inches again.
     """
     rig = Rig(front_m=60 * INCH_M)
     assert rig.ask("TFSFC 40") == "ok"
@@ -177,7 +177,7 @@ def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
 def test_tf_holds_its_course_with_unequal_motors() -> None:
     """The motors are unequal. The controlled move TF corrects its course by the gyro.
 
-    The uncontrolled drive F does not.
+    The uncontrolled drive F does not correct its course.
     """
     rig = Rig(motor_inequality=0.05)
     assert rig.ask("TF 80", 60.0) == "ok 80"

@@ -38,8 +38,8 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
     """Some servers answer the start of a drive (RM) with a failure although the robot moves.
 
-    For such a server no motion is in progress, so its stops fail. Only MCS, the direct control of
-    the motors, stops the robot.
+    Such a server then assumes that no motion is in progress, so the stop SRM fails. Only MCS, the
+    direct control of the motors, stops the robot.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -165,9 +165,9 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """CS and RMCS, the changes of speed, contain the change of the right and of the left motor.
+    """The speed changes CS and RMCS have two numbers: first for the right motor, then for the left.
 
-    Positive is more forward, also in the backward drive B.
+    A positive number makes a motor turn more forward, also in the backward drive B.
     """
     rig = Rig()
     rig.drive(start)

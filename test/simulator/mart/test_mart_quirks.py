@@ -167,7 +167,7 @@ def exit_is_silent(quirks: Quirks) -> bool:
 
 
 def log_deletes_files(quirks: Quirks) -> bool:
-    """Return whether a new log (LOG) deletes the last file, although the server still names it."""
+    """Return whether a new log (LOG) deletes the last file, so LAST TURN cannot download it."""
     rig = Rig(quirks)
     rig.ask("MCR SLOW 20")
     rig.ask("LOG")
@@ -324,7 +324,7 @@ def test_a_documented_server_stops_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """A controlled move is stopped at any time.
+    """A controlled move is stopped 0.02, 0.12 or 1 s after its start.
 
     A server as in the manual replies to the move within 1 s.
     """

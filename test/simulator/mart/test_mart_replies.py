@@ -91,7 +91,7 @@ def test_rmcs_with_one_number_is_refused(text: str) -> None:
 
 
 def test_only_49_bytes_are_taken_of_a_request() -> None:
-    """A request is longer than 49 bytes. The server discards the rest."""
+    """A request is longer than 49 bytes. The server ignores all bytes after the 49th."""
     rig = Rig()
     assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 40 + "7") == "ok"
     assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 28 + "7") == "ok"  # the 50th byte
@@ -133,7 +133,7 @@ def test_cs_with_one_number_does_no_harm_while_still() -> None:
 
 
 def test_an_empty_datagram_ends_the_server() -> None:
-    """An empty datagram to the command port ends the server. One to the stop port does not."""
+    """An empty datagram ends the server only if it comes to the command port."""
     rig = Rig()
     rig.stop("")
     assert rig.ask("HELLO") == "ok BBB"
@@ -175,7 +175,7 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """An obstacle in front is near. The front sonar measures three times, so its reply is later.
+    """An obstacle in front is near. The front sonar measures three times, which delays its reply.
 
     The obstacle behind is farther than its limit of 15 inches, so the rear sonar measures once.
     """

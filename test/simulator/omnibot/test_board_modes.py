@@ -61,7 +61,7 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """On some boards, the three bytes that wake the board may come during the boot.
+    """On some boards, the three bytes that wake the board can come during the boot.
 
     After the boot, the first S is obeyed.
     """

@@ -86,7 +86,7 @@ def test_stop_stops() -> None:
 
 @pytest.mark.parametrize("latches", [False, True])
 def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
-    """An emergency stop switches the motors off within the tick.
+    """An emergency stop switches the motors off in the same tick.
 
     The robot is at rest within 0.3 s and stays at rest.
     """
@@ -140,7 +140,7 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 ) -> None:
     """A board's switch is on "position", so a command is a pose in the earth frame, in mm and mrad.
 
-    A heading of more than a full turn is driven in full.
+    If the commanded heading is more than a full turn, the robot makes all of the turns.
     """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))

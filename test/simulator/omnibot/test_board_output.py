@@ -183,9 +183,9 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """The robot drives along the y axis of the earth frame, at 0.5 m/s.
+    """The robot faces and drives along the y axis of the earth frame, at 0.5 m/s.
 
-    Its delta is 20 mm: y in the earth frame, x in the body frame.
+    Its delta is 20 mm: along y in the earth frame, along x in the body frame.
     """
     board = SimulatedBoard(
         BoardSettings(

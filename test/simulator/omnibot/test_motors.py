@@ -33,7 +33,7 @@ class Wheel:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, -41.6])
 def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target: float) -> None:
-    """The wheel reaches 90 % of the speed in 0.2 s, with 5 % overshoot at most.
+    """The wheel reaches 90 % of the commanded speed in 0.2 s, and overshoots by less than 5 %.
 
     After 2 s the error is below 0.5 %.
     """
@@ -86,7 +86,7 @@ def test_efforts_within_the_dead_zone_move_nothing() -> None:
 def test_friction_never_drives_a_wheel(efforts: list[float]) -> None:
     """Friction only slows a wheel down.
 
-    Whatever the efforts, the wheel reverses only if its effort points that way.
+    A wheel changes its direction only if the effort of its motor acts in the new direction.
     """
     motor = Motor()
     for effort in efforts:

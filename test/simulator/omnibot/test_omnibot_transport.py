@@ -49,7 +49,7 @@ def test_a_board_boots_and_obeys() -> None:
 def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
     """A URL has a wrong option.
 
-    The error message says why, and names the command that lists the options.
+    The error message says what is wrong, and names the command that lists the options.
     """
     with pytest.raises(ParameterError) as refusal:
         check_address(url, OMNIBOT)

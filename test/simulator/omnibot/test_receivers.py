@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the simulated receivers, with commands typed by hand, some of them damaged."""
+"""Tests of the simulated receivers. Commands are hexadecimal texts, and some are damaged."""
 
 import pytest
 from hypothesis import given
@@ -42,7 +42,7 @@ def understood(
 ) -> list[Command]:
     """Return the commands that a new receiver finds in the bytes written to it.
 
-    ``writes``: bytes in hexadecimal. Between two writes there is a pause of ``pause_s``.
+    ``writes``: bytes in hexadecimal. After each write, no bytes arrive for ``pause_s``.
     """
     receiver = CommandReceiver(kind, awake=awake)
     commands: list[Command] = []
@@ -137,7 +137,7 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A stop has lost a byte. The counting receiver completes it with the FF of the next frame.
+    """A stop frame lacks a byte. The counting receiver adds the FF that begins the next frame.
 
     So wheel C turns at 255 LSB.
     """
@@ -147,7 +147,7 @@ def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> No
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
-    """A stop has lost a byte, and the letter P follows.
+    """A stop frame has lost a byte, and the letter P follows.
 
     The receiver reads P as a speed of wheel C, not as a pause.
     """
@@ -157,7 +157,7 @@ def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
 def test_an_idle_gap_ends_half_a_frame() -> None:
     """An idle gap comes after half a frame.
 
-    The receiver discards it, and finds the next frame or letter.
+    The receiver discards the half frame, and finds the next frame or letter.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole, kind=IDLE_GAP) == [STOP]
@@ -165,9 +165,9 @@ def test_an_idle_gap_ends_half_a_frame() -> None:
 
 
 def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
-    """A pause within a frame is shorter than 5 ms.
+    """The bytes of a frame are interrupted for less than 5 ms.
 
-    The frame continues, because bytes may be late.
+    The receiver continues the frame, because bytes may be late.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]
@@ -177,7 +177,7 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A stop has lost a byte. The window receiver completes it with the FF of the next frame.
+    """A stop frame lacks a byte. The window receiver adds the FF that begins the next frame.
 
     This FF also begins the next frame, so the receiver finds both frames.
     """

@@ -69,7 +69,7 @@ def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """The wheels slip by 10 % on average, depending on the seed.
+    """The slip of the wheels is random, depends on the seed, and is 10 % on average.
 
     The robot turns by 90 % of the encoders' angle.
     """
@@ -103,7 +103,7 @@ def test_a_force_moves_the_robot_in_its_direction() -> None:
 
 
 def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
-    """The floor slopes along its x axis. The robot rolls along that axis, whatever its heading."""
+    """The floor slopes along the x axis. The robot rolls along this axis, whatever its heading."""
     world = World(BoardSettings(slope_pwm=500.0))
     world.gripped = Twist(0.0, 0.0, pi / 2)
     for _ in range(100):

@@ -22,7 +22,9 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets by which a replay recognises the Teensy on a line. They take at least 1 s.
+"""Number of packets after which a replay has recognised the Teensy on a line.
+
+A Teensy needs at least 1 s to send them.
 
 A recording may lack the answers to the driver's first questions. A replay then recognises the
 Teensys by later packets.

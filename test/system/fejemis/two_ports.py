@@ -20,7 +20,7 @@ from omnibot_driver.simulator.fejemis import CHANNELS, SimulatedFejemis
 
 PATIENCE_S: Final = 30.0
 STANDS_TICKS: Final = 400
-"""0.8 s as a number of the simulated boards' ticks."""
+"""Number of the simulated boards' ticks in 0.8 s."""
 DRIVE, FRONT = 0, 1
 
 

@@ -140,8 +140,8 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 ) -> None:
     """The board restarts after a drive. The driver writes the controller gains again.
 
-    The pose in odom continues from its value before the restart. Its error is at most 8 cm, or
-    within 3 sigma.
+    The pose in odom continues from its value before the restart. The error is at most 8 cm, or at
+    most 3 sigma if this is more.
     """
     ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))

@@ -41,7 +41,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 ) -> None:
     """The compass shows east, and the declination is 0.1 rad. The published heading is -0.1 rad.
 
-    This is in the ENU frame, in which east is 0. GPS position and time are published, too.
+    The heading is in the ENU frame, in which east is 0. GPS position and time are published, too.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
@@ -98,7 +98,7 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 ) -> None:
     """A duty command arrives while the driver is suspended, and is refused when the driver resumes.
 
-    The driver does not need the sender's clock for this.
+    The driver recognises the delay although the message has no timestamp.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")

@@ -28,7 +28,7 @@ Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
 SECOND_TICKS: Final = 500
 STANDS_TICKS: Final = 400
-"""0.8 s as a number of the simulated controller's ticks. ``SECOND_TICKS`` are its ticks in 1 s."""
+"""``STANDS_TICKS`` is the number of the controller's ticks in 0.8 s, ``SECOND_TICKS`` in 1 s."""
 MOTIONS: Final = {
     "RM": (0.3, 0.2),
     "B": (-0.2, 0.0),

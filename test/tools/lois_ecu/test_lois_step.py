@@ -142,7 +142,7 @@ def test_records_that_are_too_short_are_refused() -> None:
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """An encoder has short and long ticks in turn, and the board has missed some edges.
+    """An encoder has short and long ticks alternately, and the board has missed some edges.
 
     The tool finds the corrections of both, whether the first tick is short or long.
     """
