@@ -233,9 +233,11 @@ class LoisConversation:
     def due(self, now: float, *, proved: bool = True) -> bytes:
         """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
 
-        Called at the time ``wake_at``. ``proved``: whether displacements have proved that the
-        robot stands still. A change of mode that needs a standstill waits for this proof, but at
-        most for 2 s of Stop: in a terminal mode, no displacements arrive that could prove it.
+        Called at the time ``wake_at``.
+
+        ``proved``: whether displacements have proved that the robot stands still. A change of mode
+        that needs a standstill waits for this proof. After the driver has sent Stop for 2 s, it
+        changes the mode without the proof: in a terminal mode, the board sends no displacements.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal

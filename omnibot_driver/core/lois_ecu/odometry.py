@@ -143,11 +143,10 @@ class LoisOdometry:
         self._comparison.begin_counts()
 
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
-        """Return whether only a restart of the board explains that the counts are near zero.
+        """Return whether counts near zero can only come from a restart of the board.
 
-        This is so if the counts differ from the prediction by more than the wheels can have rolled.
-        For a robot at rest, the counts must also be almost zero, as after a restart. Larger counts
-        may come from a push.
+        They can if they differ from the prediction by more than the wheels can have rolled. For a
+        robot at rest, a stricter limit applies too, because larger counts may come from a push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """

@@ -187,7 +187,7 @@ KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if 
 NEVER_SAID: Final = {
     "F": "RM drives forward as well, and can turn",
     "SDR": "limits a move that has no distance; the driver never starts such a move",
-    "TFSFC": "undocumented; changes the clearance that stops the robot",
+    "TFSFC": "undocumented; changes the distance from an obstacle at which the robot stops",
     "MNLV": "undocumented; reports a speed from calibration files; the encoder measures it better",
     "MD": "undocumented; reports a distance that the server computes from time",
     "MCF": "undocumented; like the command TF, but does not check the clearance",

@@ -72,8 +72,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     )
     total = 1 + arguments.records + (1 + ROUNDS) * arguments.responses
     console.confirm(
-        f"Both wheels will turn {total} times, for some seconds each, at up to full duty. Is the"
-        " robot on a box, with both wheels off the ground and nothing near them?"
+        f"In each of {total} measurements, both wheels will turn for some seconds, at up to full"
+        " duty. Is the robot on a box, with both wheels off the ground and nothing near them?"
     )
     names = [*RECORDING, *_names("kp", "tn", "td")]
     names += _names("short_correction", "long_correction")

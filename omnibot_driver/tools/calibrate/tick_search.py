@@ -162,7 +162,8 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        In all later searches, a time with a missed mark covers two distances between marks.
+        All later searches regard the time between the marks before and after a missed mark as the
+        time of two distances between marks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):

@@ -67,10 +67,11 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 
 
 class Trial(NamedTuple):
-    """One run of the search.
+    """One run of the search, of one of two kinds.
 
-    Either a user commands ``wishes`` and one datagram is disturbed, or (without wishes) a driver
-    starts while the server executes ``met`` and the network is interrupted.
+    * With ``wishes``: a user gives these commands, and one datagram is disturbed.
+    * Without ``wishes``: the driver starts while the server executes the command ``met``, and the
+      network is interrupted.
 
     ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
 
@@ -81,7 +82,8 @@ class Trial(NamedTuple):
 
     ``met``: command that the server is executing when the driver starts; empty for none.
 
-    ``away_s``: duration in s of a first interruption of the network, from the start on.
+    ``away_s``: duration in s of the first interruption of the network. It begins when the driver
+    starts.
 
     ``back_s``: time in s from the end of the first interruption to a second one, which lasts 1 s.
 

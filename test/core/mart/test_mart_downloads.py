@@ -146,7 +146,8 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
     """A server is restarted and has lost its log. The driver refuses the download of the log.
 
-    The download needs EXIT, which would end the server without a file.
+    To download a log, the driver must send EXIT. Here, EXIT would end the server without writing a
+    log file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success

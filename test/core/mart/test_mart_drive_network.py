@@ -50,7 +50,10 @@ def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_secon
 def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
     seed: int, firmware: Firmware
 ) -> None:
-    """A tenth of all datagrams is lost each way. Only an unanswered start may stop the robot."""
+    """A tenth of all datagrams is lost each way.
+
+    The driver stops the robot only if RM, which starts the drive, is not answered.
+    """
     bench = on(NetworkFaults(lose=0.1), firmware, seed)
     bench.command(0.3, 0.0, 10.0)
     assert set(texts(bench)) <= {"the controller did not answer RM; robot stopped"}

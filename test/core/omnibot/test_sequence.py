@@ -169,7 +169,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
     """The board sends a pose after every second delta, not after every fifth.
 
-    The count of a pose then shows no lost deltas.
+    The count in a pose then does not tell whether deltas were lost.
     """
     sequence = Sequence()
     for count in range(20):
