@@ -211,7 +211,7 @@ def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
 
     Both are rejected.
     """
-    with pytest.raises(Contradiction, match="front raised"):
+    with pytest.raises(Contradiction, match="front was raised"):
         mounting(*postures(np.eye(3), tilt_rad, 0.5))
 
 
