@@ -196,6 +196,21 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
     assert "30 s after its stamp" in clock.text
 
 
+@pytest.mark.parametrize("ahead_s", [3.0, -3.0])
+def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: float) -> None:
+    """The recorder's clock is 3 s ahead of the robot's, or behind it. Only the clock is reported.
+
+    The robot drives as commanded. After the drive, the e-stop is latched.
+    """
+    drive = Drive(estops=[(0.0, False), (16.5 + ahead_s, True)])
+    for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):
+        topic.late_s = topic.late_s + ahead_s
+    log = replace(drive.log(), duration_s=drive.seconds + ahead_s)
+    found = [finding for finding in judge(log) if finding.level > Level.NOTE]
+    assert found
+    assert all("after its stamp" in finding.text for finding in found), found
+
+
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
     """Some messages have NaN or infinity.
 

@@ -112,7 +112,12 @@ def shown(log: Log) -> list[Pair]:
 
 
 def _sampled(series: Series) -> Series:
-    return series.only(series.finite & np.isfinite(series.stamp_s))
+    """Return the finite rows that have a timestamp, with timestamps of the recorder's clock.
+
+    Commands, states and e-stops have times of that clock.
+    """
+    rows = series.only(series.finite & np.isfinite(series.stamp_s))
+    return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,6 +14,9 @@ Mask = NDArray[np.bool_]
 
 COMMAND_TIMEOUT_S: Final = 0.5
 """Time in s after which a command has no effect: the driver's default of ``cmd_vel_timeout``."""
+OTHER_CLOCK_S: Final = 1.0
+"""Time in s from the timestamps to the arrival of a topic's messages (median), above which the
+recorder's clock must differ from the driver's."""
 SETTLING_S: Final = 0.2
 """For this time in s before and after a change of state, a gap between messages is normal."""
 
@@ -40,6 +43,17 @@ class Series:
     def only(self, rows: Mask) -> "Series":
         """Return a series that contains only the selected rows."""
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
+
+    @property
+    def other_clock_s(self) -> float:
+        """How far the recorder's clock is ahead of that of the timestamps, in s.
+
+        0 if the difference is at most 1 s (``OTHER_CLOCK_S``), because it may be the delay of the
+        messages.
+        """
+        late_s = (self.arrived_s - self.stamp_s)[np.isfinite(self.stamp_s)]
+        ahead_s = float(np.median(late_s)) if len(late_s) else 0.0
+        return ahead_s if abs(ahead_s) > OTHER_CLOCK_S else 0.0
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
         """Return, for each time in ``at_s``, the last row that had arrived by then.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from omnibot_driver.core.reporting.diagnosis import PUBLISHED_ODOMETRY
 from omnibot_driver.core.reporting.status import RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
-from omnibot_driver.tools.report.log import Array, Log, Series, Span
+from omnibot_driver.tools.report.log import OTHER_CLOCK_S, Array, Log, Series, Span
 
 GAP: Final = 1.5
 """Step between two timestamps, in periods, above which a message may be missing."""
@@ -26,7 +26,6 @@ UNEVEN: Final = 0.1
 regarded as uneven."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
-OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
 """Longest time in s within which short steps between timestamps can compensate a long step.
@@ -126,8 +125,10 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
         ]
     )
     leaps = wide[missing < 1.0]
+    begun_s = at_s + stamped.other_clock_s
     told = [
-        not log.interrupted(at_s[row], at_s[row] + steps_s[row], stream.running) for row in wide
+        not log.interrupted(begun_s[row], begun_s[row] + steps_s[row], stream.running)
+        for row in wide
     ]
     true = (missing >= 1.0) & np.array(told, dtype=bool)
     gap_at_s, gap_s, missing = at_s[wide[true]], steps_s[wide[true]], missing[true]
