@@ -147,6 +147,21 @@ def test_who_lets_go_of_the_key_stops_the_robot(
     assert len(speeds) - moving <= ZEROS + 1
 
 
+def test_the_speeds_of_the_keys_are_tenths_of_the_drivers_limit(
+    board: PtyBoard,
+    start_driver: Callable[..., Driver],
+    probe_of: Callable[[Driver], Probe],
+    monitor_of: Callable[..., PseudoTerminal],
+) -> None:
+    """The driver has a lower limit than its default. The monitor begins with three tenths of it."""
+    driver = start_driver(board.path, max_linear_speed=0.4)
+    probe_of(driver).wait_for_state("nominal")
+    terminal = monitor_of(driver, "--teleop")
+    terminal.wait_for("0.12 m/s")
+    terminal.type("q")
+    assert terminal.end() == 0
+
+
 def test_a_monitor_that_is_ended_stops_what_it_steered(
     board: PtyBoard,
     start_driver: Callable[..., Driver],

@@ -185,20 +185,19 @@ class Feed:
 
     def _on_state(self, message: String) -> None:
         self._know(lambda model, now_s: model.state(message.data, now_s))
-        if self._ask.service_is_ready():
-            request = GetParameters.Request(names=PARAMETERS)
-            self._ask.call_async(request).add_done_callback(self._on_parameters)
         self._learned = False
 
     def _learn(self) -> None:
-        """Read the driver's parameter names after each change of state.
+        """Read the driver's parameters after each change of state.
 
         After such a change, another driver may run under the same name.
         """
-        if not self._learned and self._list.service_is_ready():
-            self._learned = True
-            listing = self._list.call_async(ListParameters.Request())
-            listing.add_done_callback(self._on_names)
+        if self._learned or not (self._list.service_is_ready() and self._ask.service_is_ready()):
+            return
+        self._learned = True
+        self._list.call_async(ListParameters.Request()).add_done_callback(self._on_names)
+        request = GetParameters.Request(names=PARAMETERS)
+        self._ask.call_async(request).add_done_callback(self._on_parameters)
 
     def _on_names(self, future: Any) -> None:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
