@@ -70,6 +70,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         settled_s=arguments.settling,
         phase_margin_deg=None if arguments.gain_optimum else arguments.phase_margin,
     )
+    _require_full_duty(robot.parameters)
     total = 1 + arguments.records + (1 + ROUNDS) * arguments.responses
     console.confirm(
         f"In each of {total} measurements, both wheels will turn for some seconds, at up to full"
@@ -95,6 +96,18 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     found = _corrections({wheel.name: wheel.levels for wheel in wheels})
     found |= _gains({wheel.name: wheel.tuned for wheel in wheels if wheel.name not in worse})
     return result_of(wheels, goals, found)
+
+
+def _require_full_duty(parameters: Mapping[str, Any]) -> None:
+    """Raise ToolError if a limit of the driver would reduce the commanded full duty."""
+    wheel_radps = FULL_PERCENT / (parameters["duty_scale"] * parameters["wheel_radius"])
+    needed = {"max_duty": FULL_PERCENT, "max_wheel_speed": wheel_radps}
+    for name, least in needed.items():
+        if parameters[name] < least:
+            raise ToolError(
+                f"the measurement needs full duty, but {name} ({parameters[name]:g}) reduces it:"
+                f" set {name} to {least:.4g} or more for the measurement"
+            )
 
 
 class _Bench:

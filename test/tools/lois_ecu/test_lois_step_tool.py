@@ -59,6 +59,20 @@ def test_a_robot_is_calibrated_from_its_records(
     assert all(name in PARAMETERS.calibrated for name in result.parameters)
 
 
+@pytest.mark.parametrize(("limit", "value"), [("max_duty", 99), ("max_wheel_speed", 5.9)])
+def test_a_limit_that_reduces_the_full_duty_is_named(
+    tmp_path: Path, limit: str, value: float
+) -> None:
+    """The driver would reduce the duty of the measurement. The tool asks for a higher limit.
+
+    Otherwise gain and dead zone would be those of a smaller duty, and the gains would be wrong.
+    """
+    robot = SimulatedRobot(tmp_path, random_motors(5))
+    robot.set_parameters({limit: value})
+    with pytest.raises(ToolError, match=f"but {limit} .* reduces it"):
+        step.run(robot, Console(yes=True), command_line().parse_args(["step", "--yes"]))
+
+
 def test_values_that_an_ended_measurement_leaves_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
