@@ -74,6 +74,19 @@ def test_the_whole_walk_finds_what_was_planted(
     assert now["delta_frame"] == "body"
 
 
+def test_a_speed_limit_is_not_taken_for_positional_control(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The driver's speed limit is below the speed of the check. The tool asks for a higher limit.
+
+    Otherwise the robot would not follow the faster command, as with positional control.
+    """
+    with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
+        assert robot.calibrate("commission", "--only", "board") == 1
+        assert "raise max_linear_speed" in capsys.readouterr().err
+        assert not robot.output.exists()
+
+
 @pytest.mark.parametrize(
     ("planted", "found"),
     [

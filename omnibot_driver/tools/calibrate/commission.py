@@ -103,6 +103,12 @@ class Walk:
         """
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
+        if 2 * slow_mps > self._robot.parameters["max_linear_speed"]:
+            raise ToolError(
+                f"the driver's max_linear_speed is below the {2 * slow_mps:.3f} m/s of this check,"
+                " so the robot could not follow the commands: raise max_linear_speed to this speed"
+                " or more, then begin again"
+            )
         say("Checking the mode switch: the wheels drive forward slowly, then twice as fast.")
         slow, fast, found.control_method = self._mode_switch(slow_mps)
         if found.control_method == "position":
