@@ -29,6 +29,11 @@ from omnibot_driver.tools.needs import ToolError
 IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
 """Time without data, in s, after which the tool stops a motion."""
+CLOCKS_S: Final = 0.1
+"""Largest difference between the driver's clock and this computer's, in s.
+
+The tool compares the times of its commands with the timestamps in the odometry.
+"""
 AT_ONCE: Final = 100
 """Largest number of pending messages that are read at once."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -48,6 +53,8 @@ class Listener(Client):
         has_imu = "imu_frame" in self.parameters
         self._topics: Sequence[str] = TOPICS if has_imu else (ODOMETRY,)
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
+        self._delay_s = math.inf
+        """Shortest time in s from a timestamp in the odometry to its arrival, in this motion."""
         self._pose, self._twist = Pose(), HALT
         self._wheel_rates: tuple[float, ...] = HALT
         if has_imu:
@@ -90,8 +97,10 @@ class Listener(Client):
             (_seconds(message), force.x, force.y, force.z, rate.x, rate.y, rate.z)
         )
 
-    def _on_odometry(self, message: Odometry) -> None:
+    def _on_odometry(self, message: Odometry, info: Mapping[str, int]) -> None:
         self._heard_s[ODOMETRY] = time.monotonic()
+        received_ns = info["received_timestamp"] or self._node.get_clock().now().nanoseconds
+        self._delay_s = min(self._delay_s, received_ns * 1e-9 - _seconds(message))
         position, turn = message.pose.pose.position, message.pose.pose.orientation
         twist = message.twist.twist
         yaw_rad = yaw_of(turn.x, turn.y, turn.z, turn.w)
@@ -125,7 +134,7 @@ class Listener(Client):
         self._wait(lambda: min(self._heard_s.values()) > 0, 1.0)
         del self._states[:-1]
         self._require_sound(states)
-        self.log = Log()
+        self.log, self._delay_s = Log(), math.inf
 
     def _require_sound(self, states: Sequence[str] = ("nominal",)) -> None:
         if self._estop:
@@ -140,6 +149,16 @@ class Listener(Client):
             raise ToolError(
                 f"no messages on {' and '.join(lost)} for {LOST_S:g} s: check that the driver"
                 " still runs, and that computer and network are not overloaded"
+            )
+
+    def _require_one_clock(self) -> None:
+        """Raise ToolError if the driver's clock and this computer's differed in this motion."""
+        if math.isfinite(self._delay_s) and abs(self._delay_s) > CLOCKS_S:
+            raise ToolError(
+                f"the odometry arrives {self._delay_s:.2f} s after its timestamps at best, so the"
+                " clocks of this computer and of the robot differ, and the commands cannot be"
+                " compared with the motion: synchronise the clocks (chrony), or run this tool on"
+                " the robot's computer"
             )
 
     def _lost(self) -> list[str]:

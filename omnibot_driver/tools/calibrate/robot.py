@@ -113,7 +113,7 @@ class Robot(Listener):
         ``show``: called with the seconds since the start.
 
         Raises ToolError on an e-stop, lost data, another node's command, a motion beyond the
-        bounds, no motion, or a robot that does not come to rest.
+        bounds, no motion, a robot that does not come to rest, or clocks that differ.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
@@ -123,10 +123,11 @@ class Robot(Listener):
         self._begin(("nominal",))
         self._unanswered = +self._unanswered  # commands of the last drive may still arrive
         self._foreign = None
-        stands = False
+        stands = True  # until the first command
         try:
             with nullcontext() if monitored else self._unmonitored():
                 try:
+                    stands = False
                     self._follow(law, bounds, topic, obeys, show)
                 finally:
                     stands = self._halt(topic)
@@ -137,6 +138,7 @@ class Robot(Listener):
             raise type(error)(f"{error}; and {UNRULY}") from error
         if not stands:
             raise ToolError(UNRULY)
+        self._require_one_clock()
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
@@ -179,8 +181,10 @@ class Robot(Listener):
         The monitor would stop a robot whose parameters are not calibrated yet.
         """
         before = {"motion_monitor": self.parameters["motion_monitor"]}
-        self.set_parameters({"motion_monitor": False})
+        self._interruption.check()
         try:
+            # The driver may set the parameter although this call is interrupted.
+            self.set_parameters({"motion_monitor": False})
             yield
         except BaseException:  # also after an error in this program
             with suppress(ToolError):
