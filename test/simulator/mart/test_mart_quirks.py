@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import pytest
 from mart_rig import INCH_M, Rig
 
-from omnibot_driver.simulator.mart import COMMAND, DOCUMENTED, FIRMWARE, SOURCE, Kind, Quirks
+from omnibot_driver.simulator.mart import DOCUMENTED, FIRMWARE, SOURCE, Kind, Quirks
 
 CONFLICT = "fail conflicting action in progress"
 IN_SOURCE_ALONE = (
@@ -339,11 +339,6 @@ def test_a_documented_move_is_cancelled_at_any_time() -> None:
             assert not rig.moving
             assert rig.in_progress is None
             assert rig.server.motions[Kind.CONTROLLED_LINEAR].posts == 0
-
-
-def test_the_ports_are_numbered_as_they_stand() -> None:
-    """The command port is channel 0."""
-    assert COMMAND == 0
 
 
 def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
