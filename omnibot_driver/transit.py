@@ -29,6 +29,9 @@ rate."""
 CLOCK_RETREATS: Final = 10.0
 """Factor by which a message that seems too early fits a sender worse than one that is late: 1 s too
 early fits as badly as 10 s too late. A message is assigned to the sender that it fits best."""
+ALIKE_S: Final = 0.02
+"""Difference in s between two misfits that does not distinguish two senders. If a message fits
+several senders, it is assigned to the one whose last number is the nearest below its own."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender is regarded as known. Before that, perhaps
@@ -122,7 +125,12 @@ class Transit:
             self._senders = [*self._senders[1 - MOST_SENDERS :], _Sender(differences_s, at_s)]
             self._senders[-1].number = number
             return 0.0
-        sender = min(possible, key=lambda sender: sender.improbability(differences_s, at_s))
+        misfits_s = {sender: sender.misfit_s(differences_s, at_s) for sender in possible}
+        limit_s = ALIKE_S + min(largest_s for _, largest_s in misfits_s.values())
+        sender = max(
+            (sender for sender in possible if misfits_s[sender][0] <= limit_s),
+            key=lambda sender: (sender.number or 0, -misfits_s[sender][0]),
+        )
         self._senders.remove(sender)
         self._senders.append(sender)  # the sender that was silent for longest is forgotten first
         sender.number = number
@@ -141,17 +149,18 @@ class _Sender:
         """Return whether this sender can have sent message ``number``: its numbers increase."""
         return number is None or self.number is None or self.number < number
 
-    def improbability(self, differences_s: Differences, at_s: float) -> float:
+    def misfit_s(self, differences_s: Differences, at_s: float) -> tuple[float, float]:
         """Return how badly the message fits this sender, as a delay in s; 0 fits exactly.
 
-        If a message is too early, the result is the time by which it is too early, multiplied by
-        ten (``CLOCK_RETREATS``).
+        The two values are the smallest and the largest possible ones, because the clocks drift. If
+        a message is too early, the result is the time by which it is too early, multiplied by ten
+        (``CLOCK_RETREATS``).
         """
-        late_s = min(
-            offset.late_s(difference_s, at_s)
+        misfits_s = [
+            offset.misfit_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)
-        )
-        return late_s if late_s >= 0.0 else -CLOCK_RETREATS * late_s
+        ]
+        return min(least for least, _ in misfits_s), min(most for _, most in misfits_s)
 
     def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
         self.heard += 1
@@ -174,8 +183,16 @@ class _Offset:
 
         ``difference_s``: arrival by our clock minus sending by the sender's clock.
         """
-        drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
-        return difference_s - self._least_s - drift_s
+        return difference_s - self._least_s - self._drift_s(at_s)
+
+    def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
+        """Return the smallest and the largest misfit, as ``_Sender.misfit_s`` explains them."""
+        excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
+        weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS
+        return weight * max(0.0, abs(excess_s) - drift_s), weight * (abs(excess_s) + drift_s)
+
+    def _drift_s(self, at_s: float) -> float:
+        return LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
 
     def hear(self, difference_s: float, at_s: float, longest_s: float) -> float:
         late_s = self.late_s(difference_s, at_s)

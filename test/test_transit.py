@@ -216,8 +216,30 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
     for number in range(20):
         receiver.hear(old, 100.0 + 0.1 * number, 0.01)
         receiver.hear(new, 100.05 + 0.1 * number, 0.01)
+    receiver.hear(old, 102.05, 0.01)
     assert refused(receiver.hear(old, 110.0, 1.0))
     assert refused(receiver.hear(new, 112.0, 1.0))
+
+
+@given(st.floats(1.0, 1000.0), st.floats(-1e-4, 1e-4), st.floats(1.2, 10.0))
+def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
+    silent_s: float, drift: float, late_s: float
+) -> None:
+    """One of two senders on a host is silent for a while, and the host's clock drifts.
+
+    After an outage of the network, a late command of each sender arrives. Both are refused.
+    """
+    receiver, silent, busy = Receiver(), Sender(), Sender(sent=1000)
+    receiver.hear(busy, 99.0, 0.01)
+    for number in range(20):
+        receiver.hear(silent, 100.0 + 0.1 * number, 0.01)
+    silent.ahead_s = busy.ahead_s = drift * silent_s
+    for number in range(20):
+        assert not refused(receiver.hear(busy, 102.0 + silent_s + 0.1 * number, 0.01))
+    assert refused(receiver.hear(busy, 104.0 + silent_s, late_s))
+    assert refused(receiver.hear(silent, 104.05 + silent_s, late_s))
+    assert not refused(receiver.hear(silent, 104.1 + silent_s + late_s, 0.01))
+    assert not refused(receiver.hear(busy, 104.15 + silent_s + late_s, 0.01))
 
 
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
