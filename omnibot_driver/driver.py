@@ -19,7 +19,8 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.output import UnblockedOutput, fill_gaps
 
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-LONGEST_END_S: Final = 4.0
+LONGEST_END_S: Final = 5.0
+"""Longest time from the event that ends the driver to the end of the process, in s."""
 LARGEST_DOMAIN: Final = 232
 """Largest ROS_DOMAIN_ID of Fast DDS. A larger one would require UDP ports above 65535."""
 USAGE: Final = "give parameters like this: --ros-args -p port:=/dev/ttyUSB0"
@@ -194,7 +195,7 @@ def _run(ending: Ending, args: list[str]) -> None:
 
 
 def _set_deadline() -> None:
-    """End the process if the shutdown takes longer than 4 s (``LONGEST_END_S``).
+    """End the process if the shutdown takes longer than 5 s (``LONGEST_END_S``).
 
     The guard process then stops the robot.
     """

@@ -40,6 +40,9 @@ SILENCE_S: Final = 0.25
 """Longest wait at shutdown, in s, for a second proof that the robot is at rest; longer for a slow
 board. The driver sends nothing during this wait. So the second proof shows that the last Stop was
 not damaged on the line: a damaged one might move the robot."""
+BOTH_PROOFS_S: Final = 2.4
+"""Longest sum of both waits, in s, however slow the board is. The process ends itself after
+``driver.LONGEST_END_S``. Before that, the guard needs time to repeat Stop if there is no proof."""
 
 T = TypeVar("T")
 
@@ -194,6 +197,7 @@ class Link:
         The lock is released during the wait, so that the pacer thread can repeat Stop.
         """
         self._session.shutdown.begin(now := time.monotonic())
+        end = now + BOTH_PROOFS_S
         self._shared.settle()
         alone = (
             self._shared.port is not None
@@ -201,11 +205,12 @@ class Link:
             and not self._shared.port.ends_with_us
         )
         proof_s = self._session.shutdown.proof_takes_s + self._session.board.traits.stops_within_s
-        self._await_standstill(now + max(UNGUARDED_S if alone else STANDS_WITHIN_S, proof_s))
+        wait_s = max(UNGUARDED_S if alone else STANDS_WITHIN_S, proof_s)
+        self._await_standstill(min(end, now + wait_s))
         if self._session.shutdown.stands and self._session.shutdown.fall_silent(
             now := time.monotonic()
         ):
-            self._await_standstill(now + max(SILENCE_S, proof_s))
+            self._await_standstill(min(end, now + max(SILENCE_S, proof_s)))
 
     def _await_standstill(self, until: float) -> None:
         while (

@@ -87,7 +87,7 @@ def end_patiently(monkeypatch: pytest.MonkeyPatch) -> None:
 
     On a busy computer the proof of a stop comes later.
     """
-    for limit in ("STANDS_WITHIN_S", "SILENCE_S", "JOIN_TIMEOUT_S"):
+    for limit in ("STANDS_WITHIN_S", "SILENCE_S", "BOTH_PROOFS_S", "JOIN_TIMEOUT_S"):
         monkeypatch.setattr(f"omnibot_driver.link.{limit}", PATIENCE_S)
 
 

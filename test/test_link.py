@@ -5,8 +5,11 @@
 The port is a real pseudo-terminal. ROS is not used.
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from listener import (
@@ -20,11 +23,15 @@ from listener import (
     session,
 )
 
+from omnibot_driver import driver
+from omnibot_driver.boards import PROFILES, check_all, load
+from omnibot_driver.core.commands.stop_proof import RAREST_S, StopProof
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import joined
-from omnibot_driver.keeper import BEAT_S, Keeper
+from omnibot_driver.core.readings import DisplacementReading
+from omnibot_driver.keeper import BEAT_S, SPEAKS_WITHIN_S, Keeper
 from omnibot_driver.simulator.omnibot import PtyBoard
 from omnibot_driver.transports.serial_port import SerialPort
 
@@ -118,6 +125,49 @@ def test_closing_writes_stop_and_ends_the_threads(
     assert not link.close("stop")
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
     assert ours.state == "disconnected"
+
+
+@dataclass
+class SlowShutdown:
+    """A shutdown in which each proof that the robot is at rest needs all the time that it gets."""
+
+    proof_takes_s: float
+    stands: bool = False
+
+    def begin(self, _now: float) -> None:
+        pass
+
+    def fall_silent(self, _now: float) -> bool:
+        self.stands = False
+        return True
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proofs(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Displacements come once a second. The first proof comes at the last moment, the second never.
+
+    The waits and the guard's last words together take less time than the process has for its end.
+    """
+    traits = load(name).make(check_all({"board": name})).traits
+    proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S
+    proof.look(DisplacementReading(0.0, 0.0, 0.0, "body", slow, 0), 1.0)
+    shutdown = SlowShutdown(proof.takes_s)
+    board: Any = SimpleNamespace(shutdown=shutdown, board=SimpleNamespace(traits=traits))
+    link, waits_s = link_to("sim://", Listener(), board), []
+
+    def wait(seconds: float) -> None:
+        waits_s.append(seconds)
+        shutdown.stands = len(waits_s) == 1
+
+    clock = SimpleNamespace(monotonic=lambda: sum(waits_s))
+    monkeypatch.setattr("omnibot_driver.link.time", clock)
+    shared: Any = link._shared
+    shared.port, shared.keeper = SimpleNamespace(ends_with_us=False), object()
+    shared.changed, shared.settle = SimpleNamespace(wait=wait), lambda: None
+    link._stop_for_good()
+    assert sum(waits_s) + SPEAKS_WITHIN_S < driver.LONGEST_END_S
 
 
 def test_every_read_and_every_write_can_be_listened_to(

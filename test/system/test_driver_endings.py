@@ -42,7 +42,7 @@ def driving(probe: Probe, board: PtyBoard) -> None:
 
 PATIENT = """
 import omnibot_driver.driver as driver, omnibot_driver.link as link
-link.STANDS_WITHIN_S = link.SILENCE_S = link.JOIN_TIMEOUT_S = 10.0
+link.STANDS_WITHIN_S = link.SILENCE_S = link.BOTH_PROOFS_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
 """Code that sets longer time limits for the driver's end.
