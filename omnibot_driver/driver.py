@@ -186,9 +186,11 @@ def _run(ending: Ending, args: list[str]) -> None:
     ending.wait()
     _set_deadline()
     driver.close()
-    stopping.set()
-    executor.create_task(lambda: None)  # wake-ups alone do not end spin_once
+    # The executor runs its newest task first. So the services that waited for the board, and have
+    # now a result, run after the outer task and before the inner one.
+    executor.create_task(lambda: executor.create_task(stopping.set))
     spinner.join(timeout=0.5)
+    stopping.set()  # for a callback that hangs and returns later
     if not spinner.is_alive():
         executor.shutdown(timeout_sec=0.0)  # otherwise rclpy may print a traceback at exit
     driver.destroy_node()

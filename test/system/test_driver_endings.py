@@ -19,7 +19,7 @@ from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from probe import Probe
 from std_msgs.msg import Bool
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 from terminal import fill
 
 from omnibot_driver.simulator.omnibot import BoardMode, PtyBoard
@@ -109,6 +109,52 @@ def test_the_executor_is_shut_down_before_python_ends(start_driver: Start) -> No
     driver.wait_for_line("state: nominal")
     assert driver.end(signal.SIGTERM) == 0
     assert "left running: 0\n" in driver.output
+
+
+HOLDS_THE_EXECUTOR = """
+import threading, omnibot_driver.driver as driver, omnibot_driver.node as node
+from rclpy.executors import Executor
+driver.LONGEST_END_S = 50.0
+closed, go_on, close, create_task = threading.Event(), threading.Event(), *(
+    node.OmniBotDriver.close, Executor.create_task
+)
+def close_and_say_so(self):
+    close(self)
+    closed.set()
+def create(self, *args):
+    task = create_task(self, *args)
+    if closed.is_set():
+        go_on.set()
+    return task
+def hold(self, message):
+    print("held")
+    go_on.wait()
+node.OmniBotDriver.close, Executor.create_task = close_and_say_so, create
+node.OmniBotDriver._on_estop_topic = hold
+join = threading.Thread.join
+threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20 * timeout)
+"""
+"""Code that holds the executor's thread in a callback until the driver has asked it to end.
+
+The code also makes the driver wait longer for its threads.
+"""
+
+
+def test_a_pending_service_answers_although_the_executor_learns_of_its_result_late(
+    start_board: Start, start_driver: Start, probe_of: Start
+) -> None:
+    """The driver ends during a reset, while a callback runs. The answer of ``~/reset`` says so."""
+    board = start_board(boot_time_s=1000.0, running=True)
+    driver: Driver = start_driver(board.path, before=HOLDS_THE_EXECUTOR)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    estop = probe.publisher(Bool, "estop")
+    reset = probe.call_async(Trigger, "reset")
+    assert board.wait_for(lambda b: b.mode is BoardMode.BOOTING, PATIENCE_S)
+    estop.publish(Bool(data=True))
+    driver.wait_for_line("held")
+    assert driver.end(signal.SIGTERM) == 0
+    assert reset.wait().message == "the driver is shutting down"
 
 
 EXPLODES = """
