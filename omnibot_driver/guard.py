@@ -25,6 +25,9 @@ END = b"\n"
 """End of a message that begins with ``=``. Such a message replaces both stop commands."""
 BYE = b"!"
 """Message that ends the guard. The driver sends it after it has stopped the robot itself."""
+WRITTEN = b"w"
+"""Message directly before the end of input. The driver ends in order, and has written its own last
+packets. They may still wait in the kernel, so the guard must not discard them."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20
@@ -47,16 +50,16 @@ def watch(stop: Words, emergency_stop: Words) -> None:
     ``BYE`` means that the driver has stopped the robot itself.
     """
     patience_s: float | None = LIMIT_S
-    latched, rest = False, b""
+    latched, written, rest = False, False, b""
     while True:
         for line, _ in stop + emergency_stop:
             os.set_blocking(line, False)
         last_words = emergency_stop if latched else stop
         if not select.select([DRIVER], [], [], patience_s)[0]:
-            speak(last_words, until=[DRIVER])
+            speak(last_words, until=[DRIVER], drop=True)
             patience_s = None
         elif not (heard := os.read(DRIVER, 4096)):
-            speak(last_words, until=[])
+            speak(last_words, until=[], drop=not written)
             return
         else:
             patience_s = LIMIT_S
@@ -65,7 +68,8 @@ def watch(stop: Words, emergency_stop: Words) -> None:
                 return
             if given:
                 stop, emergency_stop = map(words, given.decode().split(" "))
-            if beats:
+            written = WRITTEN in beats
+            if beats := beats.replace(WRITTEN, b""):
                 latched = beats.endswith(LATCHED_BEAT)
 
 
@@ -82,14 +86,14 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
     return beats + heard, given, b""
 
 
-def speak(last_words: Words, until: list[int]) -> None:
+def speak(last_words: Words, until: list[int], drop: bool) -> None:
     """Write the stop command 20 times. End earlier if ``until`` has input or all lines are lost.
 
     ``until``: descriptors. Input from the driver shows that the driver runs again, and can stop the
-    robot itself.
+    robot itself. ``drop``: whether to discard first what the driver has written.
     """
     lines = {line for line, _ in last_words}
-    for line in lines:
+    for line in lines if drop else ():
         drop_what_waits(line)
     for _ in range(TIMES):
         for line, data in last_words:

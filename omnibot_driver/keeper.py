@@ -90,17 +90,19 @@ class Keeper:
         except OSError:  # it ended or does not read: a new guard gets these commands
             self._give_up(process)
 
-    def end(self, *, stopped: bool) -> None:
+    def end(self, *, stopped: bool, written: bool = False) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        ``stopped``: whether the robot is already stopped. If not, the guard first sends its stop
-        command.
+        * ``stopped``: whether the robot is already stopped. If not, the guard first sends its stop
+          command.
+        * ``written``: whether the driver has written its last packets. If not, the guard discards
+          the output that waits in the kernel, because this may be old motion commands.
         """
         self._restart_at = math.inf
         if stopped:
             self._dismiss(guard.BYE, LEAVES_WITHIN_S)
         else:
-            self._dismiss(b"", SPEAKS_WITHIN_S)
+            self._dismiss(guard.WRITTEN if written else b"", SPEAKS_WITHIN_S)
         until = time.monotonic() + DIES_WITHIN_S
         for process in self._dying:
             with contextlib.suppress(subprocess.TimeoutExpired):

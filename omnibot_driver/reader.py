@@ -196,12 +196,13 @@ class Reader:
             else:  # write Stop directly after the bytes that can no longer be discarded
                 port.write_if_room(self._session.shutdown.broken_off())
             lines = len(port.descriptors or ())  # one of several may still be open and need a stop
+            written = self._closing.is_set() and self._shared.write_error is None
             stopped = self._shared.stood if self._closing.is_set() else comes_back and lines < 2
             keeper, self._shared.port, self._shared.keeper = self._shared.keeper, None, None
             self._session.closed(time.monotonic())
             self._shared.settle()
         if keeper is not None:
-            keeper.end(stopped=stopped)
+            keeper.end(stopped=stopped, written=written)
         self._outbox.deliver()
 
     def _tell(self, delivery: Delivery) -> None:

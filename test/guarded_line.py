@@ -27,6 +27,13 @@ LAST_WORDS = b"these are my last words"
 LATCHED_WORDS = b"and these under the e-stop"
 
 
+EARLY_S = -1000.0
+"""Time of a simulated heartbeat, in s, which is before every time of the real clock.
+
+The real clock begins near 0 at boot, so its time is never negative.
+"""
+
+
 class Line:
     """A pseudo-terminal that replaces the serial line. ``near`` is the end at the driver."""
 

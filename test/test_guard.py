@@ -13,9 +13,11 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from guarded_line import (
+    EARLY_S,
     LAST_WORDS,
     LATCHED_WORDS,
     PATIENCE_S,
@@ -99,6 +101,29 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
     beat_until(keeper, lambda: replaced(line, first))
     keeper.end(stopped=False)
     assert b"missing" not in line.hear(2 * b"newest" + b"newest")
+
+
+def test_the_last_packets_of_an_orderly_end_are_not_discarded(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver writes its last packets, such as a pause, and ends without a proof of a stop.
+
+    These packets may still wait in the kernel, so the guard repeats Stop without discarding them.
+    """
+    reading, writing = os.pipe()
+    process = SimpleNamespace(stdin=os.fdopen(writing, "wb", 0), wait=lambda _within_s: 0)
+    monkeypatch.setattr("subprocess.Popen", lambda *_arguments, **_options: process)
+    monkeypatch.setattr(guard, "DRIVER", reading)
+    monkeypatch.setattr(guard, "PACE_S", 0.0)
+    discarded: list[int] = []
+    monkeypatch.setattr(guard, "drop_what_waits", discarded.append)
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    keeper.beat(EARLY_S, latched=True)
+    keeper.end(stopped=False, written=True)
+    guard.watch([(line.near, LAST_WORDS)], [(line.near, LATCHED_WORDS)])
+    os.close(reading)
+    assert not discarded
+    assert line.hear(guard.TIMES * LATCHED_WORDS) == guard.TIMES * LATCHED_WORDS
 
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:

@@ -12,16 +12,19 @@ import signal
 import threading
 
 import pytest
-from guarded_line import LAST_WORDS, LATCHED_WORDS, PATIENCE_S, Line, beat_until, replaced, started
+from guarded_line import (
+    EARLY_S,
+    LAST_WORDS,
+    LATCHED_WORDS,
+    PATIENCE_S,
+    Line,
+    beat_until,
+    replaced,
+    started,
+)
 
 from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
-
-EARLY_S = -1000.0
-"""Time of a simulated heartbeat, in s, which is before every time of the real clock.
-
-The real clock begins near 0 at boot, so its time is never negative.
-"""
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:

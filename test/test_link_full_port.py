@@ -25,6 +25,7 @@ from terminal import Terminal
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.session import Session
+from omnibot_driver.keeper import Keeper
 from omnibot_driver.link import Link
 from omnibot_driver.transports import Transport
 
@@ -68,6 +69,30 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
     assert not link.close("stop")
     terminal.read_until(5 * joined(LAST_WORDS[0]))
     wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
+    full: bool, terminal: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The board is silent, so the link closes without a proof of rest, and the guard repeats Stop.
+
+    If the port is full, old commands are in it, and the guard discards them.
+    """
+    ends: list[dict[str, bool]] = []
+    end = Keeper.end
+
+    def record(keeper: Keeper, **how: bool) -> None:
+        ends.append(how)
+        end(keeper, **how)
+
+    monkeypatch.setattr(Keeper, "end", record)
+    link, _ours = at_rest(terminal)
+    if full:
+        terminal.fill()
+    link.close("stop")
+    wait_for_the_end_of("omnibot-reader", "omnibot-pacer")
+    assert ends[0] == {"stopped": False, "written": not full}  # a full port is opened again
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:

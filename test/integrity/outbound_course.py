@@ -70,7 +70,7 @@ class Course:
         receiver = CommandReceiver(kind, awake=True)
         held, plain = [], []
         free_s = -1.0
-        for number, (write, items) in enumerate(zip(self.writes, self.items, strict=True)):
+        for write, items in zip(self.writes, self.items, strict=True):
             waits = write.at_s < free_s
             free_s = max(write.at_s, free_s) + len(write.data) * BYTE_S
             heard = [
@@ -82,8 +82,7 @@ class Course:
             says: list[tuple[int, Command]] = [
                 (at, ControlFrame(mode, words)) for at, mode, words in items.frames
             ]
-            flushed = number + 1 < len(self.writes) and self.writes[number + 1].flush
-            plain.append(heard == says and not waits and not flushed)
+            plain.append(heard == says and not waits)
         until = [len(self.writes)] * len(self.writes)
         for number in reversed(range(len(self.writes) - 1)):
             after = number + 1

@@ -37,14 +37,10 @@ History = tuple[tuple[int, Shown], ...]
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes that the driver or its guard writes.
-
-    ``flush``: whether the bytes of earlier writes that the line has not carried yet are discarded.
-    """
+    """Bytes that the driver or its guard writes."""
 
     at_s: float
     data: bytes
-    flush: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,10 +188,10 @@ class _Rehearsal:
             self._writes += self._guards_words(now)
 
     def _guards_words(self, now: float) -> Iterator[Write]:
-        """Yield the guard's writes. The first write discards the bytes that still wait."""
+        """Yield the guard's writes."""
         words = joined(self._bot.stop())
         if self._session.estop_active:
             words = joined(self._bot.emergency_stop()) + words
         begin_s = now + self._scene.guard_after_s
         for number in range(guard.TIMES):
-            yield Write(begin_s + number * guard.PACE_S, words, flush=number == 0)
+            yield Write(begin_s + number * guard.PACE_S, words)

@@ -169,9 +169,6 @@ class Trial:
         write, items = course.writes[number], course.items[number]
         self._number += 1
         start_s, data = max(write.at_s, self._free_s), write.data
-        if self._number < len(course.writes) and course.writes[self._number].flush:
-            begun = math.ceil((course.writes[self._number].at_s - start_s) / BYTE_S)
-            data = data[: max(0, begun)]
         self._free_s = start_s + len(data) * BYTE_S
         drove = self._judge.driving
         self._judge.write(items, start_s)
