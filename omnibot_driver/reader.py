@@ -66,6 +66,9 @@ class Reader:
                 with closing(self._open()) as port:
                     comes_back = False
                     try:
+                        with self._lock:
+                            self._earlier_overruns += self.overruns or 0
+                            self.overruns = None
                         self._attach(port)
                         self._read(port)
                     except LinkError:
@@ -94,8 +97,7 @@ class Reader:
         with self._lock:
             self._shared.port, self._shared.write_error, self._shared.keeper = port, None, keeper
             self.opened += 1
-            self._earlier_overruns += self.overruns or 0
-            self.overruns, self._count_at = None, -math.inf
+            self._count_at = -math.inf
             self._session.opened(time.monotonic(), missing="; ".join(missing))
             if notices:
                 self._outbox.put(partial(self._deliver, notices))

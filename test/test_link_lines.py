@@ -170,6 +170,33 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
     assert b"v 2" not in lines.drive.read_until(5 * STOPS)
 
 
+def test_an_overrun_is_counted_once_although_another_line_is_lost_and_comes_back(
+    lines: Lines, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel has lost bytes of two lines, 5 and 3 times. The second line is opened again.
+
+    The kernel counts the losses of the new connection from 0. The total remains 8.
+    """
+    overruns = {lines.drive.path: 5, str(lines.name): 3}
+    monkeypatch.setattr(SerialPort, "overruns", property(lambda port: overruns[port._url]))
+    monkeypatch.setattr("omnibot_driver.reader.COUNT_EVERY_S", 0.0)
+    told: list[int] = []
+    lines.session.overran = told.append  # type: ignore[method-assign]
+    lines.connect()
+    lines.link.start()
+    lines.say_that_it_stands()
+    assert set(told) == {8}
+    lines.name.unlink()
+    lines.sense.close()
+    lines.come_to_state("connecting")
+    overruns[str(lines.name)] = 0
+    lines.sense = Terminal()
+    lines.connect()
+    lines.say_that_it_stands()
+    assert set(told) == {8}
+    assert lines.link.figures()[0].overruns == 8
+
+
 def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
     """The line ``drive`` of a board is missing, so motion is refused.
 

@@ -90,8 +90,11 @@ class Several:
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes, over all open lines; None if a line has no count."""
-        counts = [port.overruns for port in self._ports]
+        """How often the kernel has lost bytes, over all lines; None if an open line has no count.
+
+        Earlier connections of a line that was opened again are included.
+        """
+        counts = [line.overruns for line in self._lines]
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
@@ -260,12 +263,24 @@ class Line:
         self.watched = False
         """Whether ``poll`` reports when the line accepts bytes again."""
         self._full_since = 0.0
+        self._overruns = self._earlier_overruns = 0
+
+    @property
+    def overruns(self) -> int | None:
+        """How often the kernel has lost bytes, over all connections; None if it does not count."""
+        if self.port is not None:
+            if (count := self.port.overruns) is None:
+                return None
+            self._overruns = count
+        return self._earlier_overruns + self._overruns
 
     def begin(self, port: ByteLine) -> None:
         """Use this port, which has just been opened."""
         assert port.descriptors is not None
         self.port, (self.descriptor,) = port, port.descriptors
         self.trouble, self.waits, self.watched = "", b"", False
+        self._earlier_overruns += self._overruns
+        self._overruns = 0
 
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes waited too long.
