@@ -63,7 +63,8 @@ class ModeTracker:
             raise RequestRefused(
                 f"the board is {self.mode.value}: «{happening.value}» is not allowed in this mode"
             ) from None
-        self.imus_to_come = self._imus_alone
+        if happening is not Happening.SENT_START:  # the driver may repeat S before the last frame
+            self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:
         """Update the mode: a received frame shows in which mode the board is."""

@@ -249,6 +249,20 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 
 
 @EVERY_PERIOD
+@pytest.mark.parametrize("running", [True, False])
+@pytest.mark.slow
+def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) -> None:
+    """The driver connects to a board in IMU-only mode, which may be paused at first.
+
+    The driver repeats the start every 0.5 s, because it has not seen the board running. This does
+    not keep the driver from recognizing IMU-only mode.
+    """
+    bench = Bench(BoardSettings(imu_only=True, running=running, delta_period_s=period_s))
+    bench.open()
+    bench.run_until_state("imu_only", 4.0)
+
+
+@EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
     """23 damaged bytes come in place of an IMU frame and a delta. One lost IMU frame is counted."""
     schedule = Schedule(period_s)
