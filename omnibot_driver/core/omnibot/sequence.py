@@ -142,7 +142,9 @@ class Sequence:
         from_zero = abs(count * self._per_pose - self._delta) <= self._per_pose
         # While the counter of the last delta is doubtful, a pose does not show a restart.
         goes_on = passed == self._per_pose or self._ahead is not None
-        if from_zero and not goes_on and abs(passed - counted) > 2 * self._per_pose:
+        wrap = WRAP * self._per_pose
+        off = (passed - counted) % wrap
+        if from_zero and not goes_on and min(off, wrap - off) > 2 * self._per_pose:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)
         if (self._told + missing) * self._period_s > now - self._delta_at + self._period_s:

@@ -27,10 +27,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
+@pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600, 1300, 2600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """Up to 600 deltas are lost, perhaps in a curve, and SEQ may wrap in the gap.
+    """Up to 2600 deltas are lost, perhaps in a curve. The counters may wrap in the gap.
 
     After 1 s, odom is the board's own pose again.
     """

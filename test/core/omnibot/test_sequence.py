@@ -149,6 +149,24 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
     assert sequence.delta(22, 22 * 0.04) == Step(2)
 
 
+@pytest.mark.parametrize("lost", [1300, 2600])
+def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(lost: int) -> None:
+    """More than 256 poses are lost, so the counter of the poses wraps. The gap lasts over 51.2 s.
+
+    The next pose is not taken for the first one after a restart.
+    """
+    sequence = Sequence()
+    for count in range(50):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    for count in range(50 + lost, 60 + lost):
+        step = sequence.delta(count % 256, count * 0.04)
+        assert step == Step(lost if count == 50 + lost else 0)
+        if count % 5 == 4:
+            assert sequence.pose(count // 5 % 256, count * 0.04) == Step(0)
+
+
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
     """The board restarts. By chance, its count 0 also fits the last count and the elapsed time.
 
