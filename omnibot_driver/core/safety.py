@@ -145,6 +145,7 @@ class SafetyStops:
         if not liveness.fell_silent(now):
             return
         self.react(self._measurement.release(), now)
+        self._measurement.restart()
         self._reporter.silent(  # a board that loses power leaves a partial frame
             liveness.silence_s,
             bytes_came=liveness.came_at - liveness.heard_at > liveness.silence_s / 2,
@@ -152,7 +153,6 @@ class SafetyStops:
         if self._board.mode is not Mode.UNKNOWN:
             self._board.silence()
             self._task.give_up("the board stopped responding; check its power and cable")
-            self._measurement.restart()
             self.set_out(now)
             self._mode_manager.heard_nothing(now)
 

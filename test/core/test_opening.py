@@ -7,6 +7,7 @@ from robots import standing
 from session_bench import OPENING, START, Bench
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.omnibot import BoardSettings
 
@@ -94,6 +95,26 @@ def test_a_silent_board_is_told_once() -> None:
     bench.speaks = False
     bench.run(10.0)
     assert len([text for text in bench.notices if "power" in text]) == 2
+
+
+def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old() -> None:
+    """Three IMU frames arrive, which do not show the mode. Then the board is silent for 5 s.
+
+    All later stamps are recent.
+    """
+    bench = Bench(BoardSettings(running=True))
+    bench.open()
+    bench.run(0.03)
+    assert any(isinstance(event, ImuEstimate) for event in bench.events)
+    assert bench.session.state == "connecting"
+    bench.speaks = False
+    bench.run(5.0)
+    bench.speaks = True
+    bench.events.clear()
+    bench.run(0.3)
+    stamps = [e.stamp_s for e in bench.events if isinstance(e, ImuEstimate | OdometryEstimate)]
+    assert len(stamps) > 30
+    assert min(stamps) > bench.now - 0.4
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
