@@ -204,7 +204,12 @@ class OmniBot:
         return readings + self._translation.readings(found, self._decoder.skipped, now)
 
     def silence(self) -> None:
-        """Forget the mode, because the board has been silent for too long."""
+        """Forget the mode, because the board has been silent for too long.
+
+        Discard the held bytes too, because a frame in them would get the time of the next read.
+        """
+        self._pieces.clear()
+        self._decoder.flush(self._decoder.last_arrival_s)
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
