@@ -14,7 +14,7 @@ from typing import Final
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import NOTHING, Covariance, OdometryNoise
-from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
+from omnibot_driver.core.odometry.gap_interpolation import LONGEST_BRIDGE_S, GapInterpolation
 from omnibot_driver.core.odometry.pending_displacements import PendingDisplacements, advanced
 from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 from omnibot_driver.core.odometry.pose_tracker import PoseTracker
@@ -167,8 +167,10 @@ class Odometry:
         if self._board is None or self._restarted is not None:
             self._belief.doubted = told
             return []
-        if self._backlog and self._settings.use_board_pose and self._reachable(told):
-            return self._resume(told)
+        lost_s = reading.lost * self._bridge.period_s
+        is_long = bool(self._backlog) or lost_s > LONG_GAP_S
+        if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
+            return self._resume(told, lost_s)
         estimates = self._release()
         self._bridge_until_pose(reading.lost)
         if self._settings.use_board_pose:
@@ -227,10 +229,13 @@ class Odometry:
         self._track.uncertainty.give_up()
         return estimates
 
-    def _resume(self, told: Pose) -> list[OdometryEstimate]:
-        """Use a pose to compute the motion that was lost before the waiting displacements."""
+    def _resume(self, told: Pose, lost_s: float) -> list[OdometryEstimate]:
+        """Use a pose to compute the motion that was lost before the waiting displacements.
+
+        ``lost_s``: duration of the gap in s if no displacement is waiting.
+        """
         assert self._board is not None
-        seconds = self._backlog.unstamped_s(self._last_stamp_s)
+        seconds = self._backlog.unstamped_s(self._last_stamp_s) if self._backlog else lost_s
         way = log_of(self._board.way_to(self._backlog.before(told)))
         self._board = self._board.moved(roll(way))
         self._track.resume(way)
@@ -274,8 +279,8 @@ class Odometry:
         self._board = told
         self._belief.believe(told)
 
-    def _reachable(self, told: Pose) -> bool:
-        waited_s = self._backlog.unheard_s(self._last_stamp_s) + self._backlog.duration_s
+    def _reachable(self, told: Pose, lost_s: float = 0.0) -> bool:
+        waited_s = self._backlog.unheard_s(self._last_stamp_s) + self._backlog.duration_s + lost_s
         settings = self._settings
         return self._belief.reachable(told, waited_s, settings.fastest_mps, settings.fastest_radps)
 
@@ -321,11 +326,15 @@ class Odometry:
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Assume that the last motion went on during the ``lost`` displacements before a pose."""
+        """Assume that the last motion went on during the ``lost`` displacements before a pose.
+
+        It went on for ``LONGEST_BRIDGE_S`` at most.
+        """
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
             self._track.miss((lost + 1) * period_s)
-            self._cross(tangent.times(lost, lost, lost), lost * period_s)
+            most = min(lost, round(LONGEST_BRIDGE_S / period_s))
+            self._cross(tangent.times(most, most, most), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Add a motion that took ``seconds``: a tangent (twist x time) in the board's body axes.

@@ -34,6 +34,9 @@ EARLY_S: Final = 0.2
 If the last delta before the restart was read late, the elapsed time is measured too short. The
 restart itself takes longer than ``EARLY_S``, and is part of the elapsed time.
 """
+LONG_GAP_S: Final = 1.0
+"""Duration of lost deltas, in s, above which the next pose cannot show a restart: the last delta is
+then too old to be compared with it."""
 
 
 @value(frozen=True, slots=True)
@@ -139,15 +142,18 @@ class Sequence:
         self._regular = self._regular or 0 < passed == counted
         if not self._regular:
             return Step(0)
+        missing = max(0, passed - counted)
+        elapsed_s = now - self._delta_at
+        in_time = (self._told + missing) * self._period_s <= elapsed_s + self._period_s
         from_zero = abs(count * self._per_pose - self._delta) <= self._per_pose
         # While the counter of the last delta is doubtful, a pose does not show a restart.
         goes_on = passed == self._per_pose or self._ahead is not None
+        goes_on = goes_on or (in_time and missing * self._period_s > LONG_GAP_S)
         wrap = WRAP * self._per_pose
         off = (passed - counted) % wrap
         if from_zero and not goes_on and min(off, wrap - off) > 2 * self._per_pose:
             return Step(0, None, restarted=True)
-        missing = max(0, passed - counted)
-        if (self._told + missing) * self._period_s > now - self._delta_at + self._period_s:
+        if not in_time:
             return Step(0)  # too little time has passed for these losses
         self._told += missing
         return Step(missing)

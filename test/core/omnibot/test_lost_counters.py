@@ -17,7 +17,7 @@ from lossy_drives import (
     settled,
     steps,
 )
-from lossy_odometry import DELTA, POSE, loses_nothing
+from lossy_odometry import DELTA, POSE, board_pose, loses_nothing
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
@@ -217,6 +217,63 @@ def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose:
     for _ in range(10):
         on.run(PERIOD_S)
         assert on.error.way_m < 0.005, on.error
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap_s", [1.2, 5.0, 24.0])
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_long_gap_that_ends_with_a_pose_is_not_bridged(gap_s: float, frame: str) -> None:
+    """The robot stops early in a long gap. A pose is the first frame after the gap.
+
+    Odom does not continue the motion from before the gap. The first odom after it is right.
+    """
+    for seed in range(3):
+        on = line(seed, frame=frame)
+        while on.board.tick % 20 != 16:
+            on.run(0.01)
+        on.drives = False
+        before = on.estimates[-1].pose
+        on.loses = lambda _data, _now: True
+        on.run(gap_s + 0.03)
+        on.loses = lambda data, _now: data[:2] == DELTA
+        on.run(0.01)
+        on.loses = loses_nothing
+        moved_m = before.way_to(on.attached.way_to(board_pose(on.board))).way_m
+        after = on.run(PERIOD_S)
+        assert len(after) == 1
+        assert settled(on), on.error
+        after += on.run(0.2)
+        assert max(before.way_to(estimate.pose).way_m for estimate in after) < moved_m + 0.01
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gap_s", [3, 8])
+def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: int) -> None:
+    """The robot moves in a long gap, and then stands. Some poses arrive before the next delta.
+
+    The first of these poses shows the motion, so odom is right.
+    """
+    for seed in range(5):
+        on = line(seed)
+        lose(on, gap_s)
+        on.drives = False
+        lose(on, 1.0)
+        lose(on, 0.65, DELTA)
+        on.run(1.0)
+        assert settled(on), on.error
+
+
+def test_a_pose_that_does_not_correct_continues_the_motion_for_two_seconds_at_most() -> None:
+    """The robot drives at 0.25 m/s, and ``use_board_pose`` is off. A pose shows 600 lost deltas.
+
+    Odom continues the motion for 2 s, that is 0.5 m.
+    """
+    odometry = attached(OdometrySettings(use_board_pose=False))
+    step = DisplacementReading(0.01, 0.0, 0.0, "earth", PERIOD_S, 0)
+    (before,) = odometry.displace(step, 0.0)
+    odometry.settle(PoseReading(0.05, 0.0, 0.0, lost=600))
+    (after,) = odometry.displace(step, 601 * PERIOD_S)
+    assert after.pose.x_m - before.pose.x_m == pytest.approx(0.51)
 
 
 def test_a_board_that_sends_no_pose_is_bridged() -> None:

@@ -149,6 +149,25 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
     assert sequence.delta(22, 22 * 0.04) == Step(2)
 
 
+@pytest.mark.parametrize("poses", [6, 60, 206])
+def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
+    """More than 1 s of deltas are lost, and then a pose arrives before the next delta.
+
+    The pose shows the losses. It shows no restart, although the last delta before the gap may
+    happen to have a count near five times that of the pose.
+    """
+    sequence = Sequence()
+    for count in range(300):
+        sequence.delta(count % 256, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    first = 300 + 5 * poses
+    assert sequence.pose((59 + poses) % 256, (first - 1) * 0.04) == Step(5 * poses)
+    for count in range(first, first + 5):
+        assert sequence.delta(count % 256, count * 0.04) == Step(0)
+    assert sequence.pose((60 + poses) % 256, count * 0.04) == Step(0)
+
+
 @pytest.mark.parametrize("lost", [1300, 2600])
 def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(lost: int) -> None:
     """More than 256 poses are lost, so the counter of the poses wraps. The gap lasts over 51.2 s.
