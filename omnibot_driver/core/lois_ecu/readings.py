@@ -53,7 +53,7 @@ class RecordReading:
 
 @dataclass(frozen=True, slots=True)
 class RecordComes:
-    """Notification that the first lines of a requested record have arrived.
+    """Notification that lines of a record are arriving. The record may have been given up.
 
     The board takes up to 1.3 s to send a record.
     """

@@ -86,12 +86,15 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings, with the result of the request if it is known now.
 
-        If there is no reading, but lines of the record are arriving, return RecordComes.
+        A record that is not expected is dropped. If there is no reading, but lines of a record are
+        arriving, return RecordComes.
 
         ``prevented``: why the record cannot come, as a sentence. Empty if it can come.
         """
+        comes: list[LoisReading] = [RecordComes()] if decoder.in_record else []
         if self.kind is None:
-            return found
+            # The board also completes and sends a record that was given up.
+            return [one for one in found if not isinstance(one, Record)] or comes
         if decoder.in_record:
             self._command = None  # a repetition would restart the record
         for place, reading in enumerate(found):
@@ -104,7 +107,7 @@ class RecordRequest:
         if not prevented and decoder.group_statistics.damaged_records != self._damaged:
             prevented = "a line of the record was lost; call again"
         if not prevented:
-            return found or ([RecordComes()] if decoder.in_record else [])
+            return found or comes
         self._end()
         return [*found, RecordFailed(prevented)]
 

@@ -13,9 +13,9 @@ from lois_bench import FIRMWARE, Bench, configure, told
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
+from omnibot_driver.core.lois_ecu import Record, RecordKind, TerminalLine, TerminalMode
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
-from omnibot_driver.core.lois_ecu.readings import RecordFailed, TerminalLeft
+from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.terminal import ModeChange
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
@@ -218,6 +218,24 @@ def test_a_terminal_mode_ends_a_record() -> None:
     bench.run_until(lambda: bench.board.terminal_mode == 1)
     with pytest.raises(RequestRefused, match="terminal_mode is gps"):
         board.record(RecordKind.TORQUE, 500)
+
+
+def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
+    """The drive mode changes during a record, so the driver gives the record up.
+
+    The board completes this record later. The driver drops it, and takes its lines as a sign that
+    the board is connected.
+    """
+    bench = Bench("firmware")
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.record(RecordKind.TORQUE, 60)
+    bench.run(0.5)
+    configure(bench, LoisEcuSettings(drive_mode="duty"))
+    bench.run(8.0)
+    assert told(bench, RecordFailed)
+    assert told(bench, RecordComes)
+    assert not told(bench, Record)
 
 
 def refusal(bench: Bench) -> str:
