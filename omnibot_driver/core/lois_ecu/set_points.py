@@ -79,6 +79,11 @@ class SetPoints:
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
+    def cleared(self) -> bool:
+        """Whether RPM 0/0 was sent often enough since the last motion."""
+        return not self._clears_left
+
+    @property
     def clears_at(self) -> float:
         """Time at which to send RPM 0/0 after a Stop. It is infinity if RPM 0/0 is not needed."""
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf

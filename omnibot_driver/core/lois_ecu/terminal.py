@@ -11,7 +11,8 @@ This module works on modes and times.
 import math
 from typing import Final
 
-from omnibot_driver.core.lois_ecu.messages import TerminalMode
+from omnibot_driver.core.lois_ecu import outbound
+from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm, TerminalMode
 
 SENSORS: Final = (TerminalMode.GPS, TerminalMode.COMPASS)
 UNPROVED_S: Final = 2.0
@@ -55,7 +56,7 @@ class ModeChange:
     def stop_first(self, parameter: str, value: str) -> None:
         """Stop the robot, because ``parameter`` gets a new ``value``.
 
-        Motion is refused until the robot is seen at rest, but for at most ``UNPROVED_S``.
+        Motion is refused until the robot is seen at rest, but for about ``UNPROVED_S`` at most.
         """
         self._stopping[parameter], self._stopping_since_s = value, None
 
@@ -97,23 +98,30 @@ class ModeChange:
         waits = self.sensor_wanted or self._told is not None
         return self._again_at_s if waits else math.inf
 
-    def stops(self, now: float, *, stands: bool) -> bool:
-        """Return whether to send Stop now, because a mode is changed only after a standstill.
+    def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
+        """Return the command to send now, because a mode is changed only after a standstill.
 
-        If the standstill cannot be seen, Stop is sent for ``UNPROVED_S``.
+        First, this is Stop. If the standstill cannot be seen, Stop is sent for ``UNPROVED_S``. Then
+        RPM 0/0 is sent, because the public firmware would count backward duty as forward motion
+        while it keeps a positive RPM target.
 
         ``stands``: whether the robot is seen at rest.
+
+        ``cleared``: whether RPM 0/0 was sent often enough.
         """
         if not self._stopping:
-            return False
+            return None
+        command: SetDuty | SetRpm = outbound.STOP
         if self._stopping_since_s is None:
             self._stopping_since_s = now
         elif stands or now - self._stopping_since_s >= UNPROVED_S:
-            self._stopping.clear()
-            self._again_at_s = -math.inf
-            return False
+            if cleared:
+                self._stopping.clear()
+                self._again_at_s = -math.inf
+                return None
+            command = outbound.EMERGENCY_STOP
         self._again_at_s = now + 0.05
-        return True
+        return command
 
     def due(self, now: float, *, settled: bool) -> TerminalMode | None:
         """Return the mode to write now, or None.

@@ -89,10 +89,10 @@ class Upkeep:
         )
 
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
-        """Return Stop, or the line that sets the terminal mode, if one of them is due."""
+        """Return a zero set-point, or the line that sets the terminal mode, if one is due."""
         change, with_sum = self.change, self.writer.settings.with_sum
-        if change.stops(now, stands=stands):
-            return outbound.lines(outbound.STOP, with_sum=with_sum)
+        if stop := change.stops(now, stands=stands, cleared=self._points.cleared):
+            return outbound.lines(stop, with_sum=with_sum)
         mode = change.due(now, settled=self.writer.done)
         if mode is None:
             return b""

@@ -13,7 +13,14 @@ from lois_bench import FIRMWARE, Bench, configure, told
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.lois_ecu import Record, RecordKind, TerminalLine, TerminalMode
+from omnibot_driver.core.lois_ecu import (
+    Record,
+    RecordKind,
+    SetDuty,
+    SetRpm,
+    TerminalLine,
+    TerminalMode,
+)
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -174,6 +181,24 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
+@FIRMWARE
+def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
+    """The user sets duty mode in a forward drive, and then drives backward.
+
+    After Stop, the public firmware would count the ticks of this motion forward.
+    """
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty"))
+    bench.run_until(lambda: refusal(bench, -0.3) == "")
+    before_m, before = bench.robot.way_m, bench.odometry[-1].pose
+    bench.drive_on(-0.3, 1.5)
+    assert bench.robot.way_m < before_m - 0.1
+    assert before.way_to(bench.odometry[-1].pose).x_m < -0.1
+    assert not [notice for notice in bench.notices if "motion monitor" in notice]
+
+
 def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
     """The user changes the duty scale while the robot is driven by duties, which depend on it.
 
@@ -238,10 +263,10 @@ def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
     assert not told(bench, Record)
 
 
-def refusal(bench: Bench) -> str:
+def refusal(bench: Bench, vx: float = 0.3) -> str:
     """Return the driver's reason for the refusal of a motion command. Empty if it is allowed."""
     try:
-        bench.drive()
+        bench.drive(vx)
     except CommandRefused as refused:
         return str(refused).removeprefix("motion command refused: ")
     return ""
@@ -289,8 +314,9 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)
-    assert change.stops(0.0, stands=False)
-    assert not change.stops(0.1, stands=True)
+    assert change.stops(0.0, stands=False, cleared=False) == SetDuty(0, 0)
+    assert change.stops(0.1, stands=True, cleared=False) == SetRpm(0, 0)
+    assert change.stops(0.2, stands=True, cleared=True) is None
     changing = "terminal_mode is changing to gps; set terminal_mode to host"
     assert change.due(0.2, settled=False) is None
     assert change.reason == changing
