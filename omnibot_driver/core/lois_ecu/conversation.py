@@ -300,7 +300,7 @@ class LoisConversation:
     def reset(self) -> bytes:
         """Return Stop and the reset command. After a reset, the board's counters start at zero."""
         self._decoder.forget_counters()
-        self._translation.connect()
+        self._translation.reset()
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:

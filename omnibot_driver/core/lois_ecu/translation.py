@@ -53,6 +53,9 @@ CONTRADICTED_S: Final = 1.0
 """If the unit of the board's clock has become unknown, wheels are assumed to have rolled back for
 at most this time in s since the last tick report. Without the unit, the clock cannot confirm how
 long ago that report came."""
+IN_FLIGHT_S: Final = 0.5
+"""Time in s, after the first counts that follow a reset, in which counts may still be from before
+the reset: the board sent them before it received the reset, or the driver read them late."""
 
 
 class Translation:
@@ -93,12 +96,19 @@ class Translation:
         unknown."""
         self._clock = (0, 0, 0)
         self._gps_works = False
+        self._reset_until_s: float | None = None
+        """Time in s until which counts may be from before a reset. None if no reset was sent."""
 
     def connect(self) -> None:
         """Begin a new connection."""
         self._connect()
         self.odometry.connect()
         self.headings.forget()
+
+    def reset(self) -> None:
+        """Begin new counts, because a reset is sent. Counts from before it may still arrive."""
+        self.connect()
+        self._reset_until_s = math.inf
 
     def readings(
         self,
@@ -120,6 +130,8 @@ class Translation:
         odometry = self.odometry
         match report:
             case Ticks():
+                if self._was_reset(report, now):
+                    self.connect()
                 restarted = self._watch(report, clock_unit, now)
                 self._late_s = self._time.late_s(report.time_counts, self._unit, now)
                 odometry.estimates.late_stddev_s = self._time.stddev_s
@@ -154,6 +166,22 @@ class Translation:
             case Record() | TerminalLine():
                 return [report]
         return []
+
+    def _was_reset(self, ticks: Ticks, now: float) -> bool:
+        """Return whether the board has obeyed a reset since the last ticks.
+
+        It has if the counts are nearer to zero than to the last counts.
+        """
+        before, until_s = self._ticks, self._reset_until_s
+        if until_s is None:
+            return False
+        if before is None:
+            self._reset_until_s = now + IN_FLIGHT_S
+            return False
+        if now >= until_s:
+            self._reset_until_s = None  # the next ticks are certainly from after the reset
+        rolled = abs(wrapped(ticks.left - before.left)) + abs(wrapped(ticks.right - before.right))
+        return abs(ticks.left) + abs(ticks.right) < rolled
 
     def _watch(self, ticks: Ticks, clock_unit: ClockUnit | None, now: float) -> list[LoisReading]:
         before, self._ticks = self._ticks, ticks

@@ -251,3 +251,33 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
     bench.reset()
     bench.run(2.0)
     assert bench.odometry[-1].pose.x_m - bench.robot.way_m == pytest.approx(before_m, abs=0.06)
+
+
+@pytest.mark.slow
+@FIRMWARE
+def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str) -> None:
+    """The user resets the board while its counts are on the line. The driver then reads 0 counts.
+
+    The difference is not a motion, and does not show that the board counts backward.
+    """
+    bench = Bench(firmware, HOST_GAINS)
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    while bench.board.wheels[0].ticks < 4:
+        bench.drive_on(0.2, 0.1)
+    bench.run(3.0)
+    assert all(8 <= wheel.ticks <= 18 for wheel in bench.board.wheels)
+    sent = more = b""
+    while more or b":12ffffffff" not in sent:
+        bench.now += TICK_S
+        more = b"".join(data for _, data in bench.robot.advance())
+        sent += more
+    before = bench.odometry[-1].pose
+    bench.session.request(Request.RESET, "token", bench.now)
+    bench.settle()
+    bench.session.inbound.receive(sent, bench.now)
+    bench.run(2.0)
+    assert [wheel.ticks for wheel in bench.board.wheels] == [0, 0]
+    assert before.way_to(bench.odometry[-1].pose).way_m < 0.02
+    assert board._ecu.translation.restarts == 0
+    assert board._ecu.translation.odometry._motion.signed is (firmware == "documented")
