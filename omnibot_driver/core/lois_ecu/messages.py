@@ -308,6 +308,12 @@ class Record:
     left: tuple[int, ...]
     right: tuple[int, ...]
 
+    @property
+    def lines(self) -> int:
+        """Number of lines that the record consists of. Each has two values, the last the end."""
+        values = len(self.left) + 1 if self.kind is RecordKind.HEADING else 2 * len(self.left)
+        return values // 2 + 1
+
 
 @dataclass(frozen=True, slots=True)
 class TerminalLine:

@@ -147,6 +147,7 @@ class Translation:
                 self._gps_works |= located
                 return [FixReading(latitude, longitude, located and self._dated)]
             case GpsDate():
+                self._time.sent(1)
                 self._date = report if _is_date(report) else None
                 self._dated = self._date is not None
             case GpsTime():
@@ -163,7 +164,10 @@ class Translation:
             case EStopButton():
                 self.odometry.halted(now)
                 return [report]
-            case Record() | TerminalLine():
+            case Record():
+                self._time.sent(report.lines)
+                return [report]
+            case TerminalLine():
                 return [report]
         return []
 

@@ -233,6 +233,24 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
     assert not [reading for reading in rig.readings if isinstance(reading, RecordFailed)]
 
 
+@pytest.mark.slow
+def test_ticks_after_a_record_are_not_taken_for_late() -> None:
+    """The clock of the public firmware stops for 0.24 s while the board sends a record.
+
+    The driver does not take the next ticks for late, so ``odom`` has no jump some seconds later.
+    """
+    rig = Rig(nominal("firmware"))
+    rig.run(4.0)
+    rig.order(20, 20, 5.0)
+    rig.driver.record(RecordKind.RPM, 200)
+    while not [reading for reading in rig.readings if isinstance(reading, RecordReading)]:
+        rig.order(20, 20, 0.05)
+    seen = len(rig.estimates)
+    rig.order(20, 20, 3.0)
+    errors_m = [fused.pose.way_to(true).x_m for fused, true in rig.estimates[seen:]]
+    assert max(errors_m) - min(errors_m) < 0.03
+
+
 def test_a_record_that_lost_a_line_is_given_up() -> None:
     """A line of a record is lost. The driver reports the failure and discards all samples."""
     rig = Rig(nominal("firmware"))
