@@ -126,7 +126,11 @@ class SettingsWriter:
         self._in_period = self._answered = False
 
     def write(self, command: Command, now: float) -> None:
-        """Queue a command that is not a setting, to be sent ``ROUNDS`` times."""
+        """Queue a command that is not a setting, to be sent ``ROUNDS`` times.
+
+        It replaces the queued commands of the same type.
+        """
+        self._others = deque(one for one in self._others if type(one[1]) is not type(command))
         for count in range(ROUNDS):
             self._queue_other(now + count * ROUND_S, command)
 

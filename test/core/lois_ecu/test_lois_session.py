@@ -281,3 +281,21 @@ def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str) -> Non
     assert before.way_to(bench.odometry[-1].pose).way_m < 0.02
     assert board._ecu.translation.restarts == 0
     assert board._ecu.translation.odometry._motion.signed is (firmware == "documented")
+
+
+def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
+    """The user switches the LED on, and off again while the first request is still being repeated.
+
+    After the first request to switch it off, no request to switch it on is sent.
+    """
+    bench = Bench("firmware")
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    begun = len(bench.written)
+    for on in (True, False):
+        board.set_led(on, bench.now)
+        bench.run(0.05)
+    bench.run(1.0)
+    sent = b"".join(data for _, data in bench.written[begun:]).splitlines()
+    led = [line[3:11] for line in sent if line.startswith(b":03")]
+    assert led == [b"00000001", *[b"00000000"] * 5]
