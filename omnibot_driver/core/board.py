@@ -136,6 +136,11 @@ class Board(Protocol):
         """
         return ""
 
+    @property
+    def reset_refusal(self) -> str:
+        """Reason why a requested reset is refused, with a remedy; empty if a reset is allowed."""
+        return ""
+
     def gravity_advice(self, gravity_mps2: float) -> str:
         """Return advice on the IMU's settings if the measured gravity is wrong; otherwise empty.
 

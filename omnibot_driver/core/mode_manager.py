@@ -134,6 +134,8 @@ class ModeManager:
             raise RequestRefused(
                 f"a {self._request.value} is under way; wait for its answer, then call again"
             )
+        if request is Request.RESET and (reason := self._board.reset_refusal):
+            raise RequestRefused(f"reset refused: {reason}")
         self._request, self._token = request, token
         self._deadline = now + ANSWER_WITHIN_S
         if request is Request.START:

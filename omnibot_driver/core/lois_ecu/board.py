@@ -98,6 +98,11 @@ class LoisEcuBoard(Board):
         return self._ecu.advice
 
     @property
+    def reset_refusal(self) -> str:
+        """Reason why a reset is refused: in a terminal mode, no ticks show it. Otherwise empty."""
+        return self._ecu.reset_refusal
+
+    @property
     def shows_standstill(self) -> bool:
         """Whether unchanged ticks would now show that both wheels are at rest.
 

@@ -297,6 +297,12 @@ class LoisConversation:
 
     # Other requests
 
+    @property
+    def reset_refusal(self) -> str:
+        """Reason why a reset is refused: a terminal mode. Empty if it is allowed."""
+        change = self._upkeep.change
+        return change.reason if change.terminal or change.sensor_wanted else ""
+
     def reset(self) -> bytes:
         """Return Stop and the reset command. After a reset, the board's counters start at zero."""
         self._decoder.forget_counters()

@@ -83,7 +83,7 @@ class OmniBot:
     clock = None
     wake_at = math.inf
     shows_standstill = True
-    refusal = ""
+    refusal = reset_refusal = ""
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)

@@ -26,6 +26,7 @@ from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, Ter
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.terminal import ModeChange
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.requests import Request
 
 GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
 COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
@@ -245,6 +246,29 @@ def test_a_terminal_mode_ends_a_record() -> None:
         board.record(RecordKind.TORQUE, 500)
 
 
+@pytest.mark.slow
+@FIRMWARE
+def test_a_terminal_mode_refuses_a_reset_at_once(firmware: str) -> None:
+    """In a terminal mode, the board sends no counts, so nothing can show that it obeys a reset.
+
+    The driver refuses the reset. After the mode has ended, a reset succeeds.
+    """
+    bench = Bench(firmware)
+    configure(bench, GPS)
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    begun = len(bench.written)
+    with pytest.raises(RequestRefused, match="reset refused: terminal_mode is gps"):
+        bench.session.request(Request.RESET, "token", bench.now)
+    bench.run(1.0)
+    assert b":18" not in b"".join(data for _, data in bench.written[begun:])
+    configure(bench, LoisEcuSettings())
+    with pytest.raises(RequestRefused, match="the board has not left its terminal mode yet"):
+        bench.session.request(Request.RESET, "token", bench.now)
+    bench.run_until(lambda: bool(told(bench, TerminalLeft)))
+    assert bench.reset().success
+
+
+@pytest.mark.slow
 def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
     """The drive mode changes during a record, so the driver gives the record up.
 
