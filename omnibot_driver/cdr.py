@@ -123,6 +123,14 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
         ) from error
 
 
+def is_zero(data: bytes) -> bool:
+    """Return whether the planar part of a serialised Twist is zero.
+
+    Raises CommandRefused in the same cases as ``twist``.
+    """
+    return twist(data)[0] == messages.AT_REST
+
+
 class Messages:
     """A replacement for Serializer that returns rclpy messages instead of CDR bytes.
 

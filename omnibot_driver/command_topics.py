@@ -24,6 +24,7 @@ def obeying(
     *,
     may_be_old: Callable[[Any], bool] = lambda _message: False,
     is_stop: Callable[[Any], bool] = lambda _message: False,
+    ends_goal: Callable[[Any], bool] = lambda _message: False,
     moves_base: bool = True,
 ) -> Callable[[Any, MessageInfo], None]:
     """Return a callback that passes each message to ``action``, with the session of the link.
@@ -33,6 +34,8 @@ def obeying(
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: returns True for a message whose time in transit does not matter.
     * ``is_stop``: returns True for a command to stop, which is obeyed even if it is old.
+    * ``ends_goal``: returns True for a command that ends a drive to a goal even if it is refused.
+      It may raise CommandRefused for an invalid message.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()
@@ -53,8 +56,12 @@ def obeying(
                 delay.require(topic, longest_s)
             action(session, message, now)
 
-        with contextlib.suppress(CommandRefused):
-            sent_ns = () if is_stop(message) else delay.sent_ns
+        sent_ns = () if is_stop(message) else delay.sent_ns
+        try:
             link.command(obey, message, sent_ns, moves_base=moves_base)
+        except CommandRefused:
+            with contextlib.suppress(CommandRefused):
+                if ends_goal(message):  # a goal does not expire, and this may be the only message
+                    link.call(Session.end_goal)
 
     return callback

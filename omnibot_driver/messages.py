@@ -43,6 +43,7 @@ twist."""
 RADIATION: Final = dict(zip(RANGE_TYPES, (Range.ULTRASOUND, Range.INFRARED), strict=True))
 """Value of ``radiation_type`` in sensor_msgs/Range, by the type of the sensor."""
 SHORTEST_QUATERNION: Final = 1e-3
+AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
@@ -199,6 +200,14 @@ def body_twist(twist: Any) -> BodyTwist:
     linear, angular = twist.linear, twist.angular
     require_finite("cmd_vel", (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
     return BodyTwist(linear.x, linear.y, angular.z)
+
+
+def is_zero(twist: Any) -> bool:
+    """Return whether the planar part of a geometry_msgs/Twist is zero.
+
+    Raises CommandRefused if any of the six values is NaN or infinity.
+    """
+    return body_twist(twist) == AT_REST
 
 
 def is_planar(twist: Any) -> bool:

@@ -193,10 +193,15 @@ class OmniBotDriver(Node):
         if Authority.BASE in authorities:
             self._looks.append(self._see_other_types)
             if self._values["enable_stamped_cmd_vel"]:
-                obey = self._obey("cmd_vel", self._twist_stamped, may_be_old=messages.is_stamped)
+                obey = self._obey(
+                    "cmd_vel",
+                    self._twist_stamped,
+                    may_be_old=messages.is_stamped,
+                    ends_goal=lambda stamped: messages.is_zero(stamped.twist),
+                )
                 self.create_subscription(TwistStamped, "cmd_vel", obey, 1)
             else:
-                obey = self._obey("cmd_vel", _twist)
+                obey = self._obey("cmd_vel", _twist, ends_goal=cdr.is_zero)
                 self.create_subscription(Twist, "cmd_vel", obey, 1, raw=True)
         if Authority.WHEELS in authorities:
             obey = self._obey("wheel_cmd", _wheels)
@@ -210,13 +215,12 @@ class OmniBotDriver(Node):
         self,
         topic: str,
         action: Action,
-        *,
-        may_be_old: Callable[[Any], bool] = lambda _message: False,
+        **judges: Callable[[Any], bool],
     ) -> Callable[..., None]:
         def expires_s() -> float:
             return float(self._values["cmd_vel_timeout"])
 
-        return obeying(self._link, topic, action, expires_s, may_be_old=may_be_old)
+        return obeying(self._link, topic, action, expires_s, **judges)
 
     def _twist_stamped(self, session: Session, stamped: TwistStamped, now: float) -> None:
         age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)

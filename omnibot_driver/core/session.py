@@ -212,6 +212,13 @@ class Session:
         """
         self._command(self._commanding.pose(goal), now)
 
+    def end_goal(self, now: float) -> None:
+        """End a drive to a goal, because a zero ``cmd_vel`` arrived but was refused, e.g. as late.
+
+        This has no effect on a velocity, which expires by itself and may be newer than the zero.
+        """
+        self._reporter.notify(self._commanding.end_goal(now))
+
     def request(self, request: Request, token: object, now: float) -> None:
         """Start, pause or reset the board. A RequestDone answers later.
 

@@ -254,6 +254,20 @@ class CommandPipeline:
             " its power and cable, then send the goal again"
         ]
 
+    def end_goal(self, now: float) -> list[str]:
+        """Drop the goal because of a zero ``cmd_vel`` that was refused; return notices.
+
+        The goal stays if the board's control switch does not permit velocities at all.
+        """
+        current = self.policy.current
+        if not isinstance(current, GoalSetpoint) or not self.shaper.takes_velocities:
+            return []
+        self.policy.halt(now)
+        return [
+            "the goal of cmd_pose is discarded: cmd_vel commanded the robot to stand still, in a"
+            " command that was refused"
+        ]
+
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 

@@ -54,9 +54,14 @@ class CommandShaper:
         self.sideways = False
         """Whether the last body velocity had a sideways part that the wheels cannot produce."""
 
+    @property
+    def takes_velocities(self) -> bool:
+        """Whether the control switch, if any, permits velocities."""
+        return self._control != "position"
+
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
         """Return the set-point for a body velocity. ``before`` is the set-point to replace."""
-        if self._control == "position":
+        if not self.takes_velocities:
             raise self._at_odds(Authority.BASE)
         limited = feasible = self.kinematics.feasible(twist)
         self.sideways = feasible.vy_mps != twist.vy_mps
@@ -75,7 +80,7 @@ class CommandShaper:
 
     def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
         """Return the set-point for wheel rates in rad/s, in the sequence of ``Traits.wheels``."""
-        if self._control == "position":
+        if not self.takes_velocities:
             raise self._at_odds(Authority.WHEELS)
         wheels = self._board.traits.wheels
         if len(rates_radps) != len(wheels):

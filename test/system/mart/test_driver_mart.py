@@ -12,11 +12,12 @@ from typing import Any, Final
 import pytest
 from batches import InBatches
 from driver_process import Driver
-from geometry_msgs.msg import PoseStamped, Twist
+from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
+from rclpy.duration import Duration
 from sensor_msgs.msg import BatteryState, Range
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
@@ -100,6 +101,14 @@ def mart(_ros: None) -> Iterator[Mart]:
 def driver(mart: Mart) -> Iterator[Driver]:
     with Driver(port=mart.url, board="mart") as driver:
         yield driver
+
+
+def goal_at(x_m: float) -> PoseStamped:
+    goal = PoseStamped()
+    goal.header.frame_id = "odom"
+    goal.pose.orientation.w = 1.0
+    goal.pose.position.x = x_m
+    return goal
 
 
 New = tuple[Mart, Driver, Probe]
@@ -205,11 +214,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
     """
     mart, driver, probe = new
     if word == "TF":
-        goal = PoseStamped()
-        goal.header.frame_id = "odom"
-        goal.pose.orientation.w = 1.0
-        goal.pose.position.x = 2.0
-        probe.publisher(PoseStamped, "cmd_pose").publish(goal)
+        probe.publisher(PoseStamped, "cmd_pose").publish(goal_at(2.0))
     else:
         vx, yaw_rate = MOTIONS[word.strip()]
         publisher = probe.publisher(Twist, "cmd_vel")
@@ -218,6 +223,27 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
         probe.node.create_timer(0.1, lambda: publisher.publish(twist))
     mart.wait_for(lambda board: board.server.executed[-1].startswith(word))
     driver.process.send_signal(signal.SIGKILL)
+    mart.stands_for_good()
+
+
+def test_a_zero_with_an_old_stamp_ends_a_goal(
+    stack: ExitStack, start_driver: Start, probe_of: Start
+) -> None:
+    """The robot drives to a goal. A zero TwistStamped arrives, 600 s old by its stamp.
+
+    The driver refuses the command, but discards the goal and stops the robot.
+    """
+    mart = mart_of(stack)
+    driver: Driver = start_driver(mart.url, board="mart", enable_stamped_cmd_vel=True)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    zeros = probe.publisher(TwistStamped, "cmd_vel")
+    probe.publisher(PoseStamped, "cmd_pose").publish(goal_at(2.0))
+    mart.wait_for(lambda board: board.server.chassis.moving)
+    zero = TwistStamped()
+    zero.header.stamp = (probe.node.get_clock().now() - Duration(seconds=600)).to_msg()
+    zeros.publish(zero)
+    driver.wait_for_line("goal of cmd_pose is discarded: cmd_vel commanded")
     mart.stands_for_good()
 
 
