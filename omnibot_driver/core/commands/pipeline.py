@@ -101,18 +101,23 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        If that is impossible, the robot is stopped.
+        If that is impossible, the robot is stopped. A command to stand still is dropped if it would
+        become a motion, because the rules for motions were not applied to it.
         """
-        if self.policy.current is None:
+        current = self.policy.current
+        if current is None:
             return []
+        stood = current.is_zero
         try:
-            self.policy.current.check_anew()
+            current.check_anew()
         except CommandRefused as error:
             self.policy.halt(now)
             return [
                 f"robot stopped: the current command does not fit the new settings ({error}); send"
                 " another command"
             ]
+        if stood and not current.is_zero:
+            self.policy.halt(now)
         return []
 
     def figures(self, now: float) -> CommandFigures:

@@ -113,6 +113,28 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
     assert last(bench) == bare(STOP)
 
 
+def test_what_the_old_scale_rounded_to_nothing_does_not_become_motion() -> None:
+    """A speed is rounded to 0 on the line, and is a motion with the new scale.
+
+    The robot stands until another command arrives. That command begins its ramp at rest.
+    """
+    limits = SpeedLimits(linear_mps2=0.1)
+    bench = Bench(BoardSettings(running=True), limits=limits)
+    bench.open()
+    bench.run_until_state("nominal")
+    bench.configure_board(linear_scale=1.0)
+    bench.drive(0.4)
+    bench.run(0.1)
+    assert last(bench) == bare(STOP)
+    mark = len(bench.written)
+    bench.configure_board(linear_scale=70.0)
+    bench.run(0.6)
+    assert b"\xff\xfe\x01" not in bench.written_since(mark)
+    bench.drive(0.4)
+    bench.run(0.1)
+    assert last(bench) == bytes.fromhex("FF FE 01 00 01 00 00 00 00")
+
+
 def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
     """A scale changes while no command is active. The driver sends nothing."""
     bench = driving()

@@ -9,6 +9,9 @@ from fejemis_bench import DRIVE, nominal
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.motion_lines import drive_line, front_line
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.steering import (
@@ -21,6 +24,8 @@ from omnibot_driver.core.fejemis.steering import (
 )
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware
 
@@ -238,6 +243,29 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
     assert math.hypot(truth.x_m, truth.y_m) < 0.006
     assert sum("allow_reverse" in text for text in bench.notices) == 1
     assert len(bench.notices) == 1
+
+
+def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
+    """Motion is refused after two stops by the motion monitor, and a sender repeats -0.3 m/s.
+
+    With ``allow_reverse`` off this is a command to stand still, which is accepted. When the user
+    sets ``allow_reverse``, the robot stays at rest, and the next command is refused.
+    """
+    bench = nominal(limits=SpeedLimits())
+    for _ in range(2):
+        bench.session.interlocks._interlock.trip(bench.now)
+    bench.drive_on(-0.3)
+    changed = bench.now
+    settings = SessionSettings(
+        limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
+    )
+    bench.session.configure(settings, bench.now, board=FejemisSettings(allow_reverse=True))
+    bench.settle()
+    bench.run(1.0)
+    motions = [line for line in bench.lines(DRIVE, changed) if line.startswith("rc")]
+    assert set(motions) == {"rc 2 0 0"}
+    with pytest.raises(CommandRefused, match="~/start"):
+        bench.drive(-0.3)
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
