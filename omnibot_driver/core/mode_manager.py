@@ -83,7 +83,7 @@ class ModeManager:
         """Packets to write before any others; see ``take_output``."""
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
-        self._paused_with_p = self._was_running = False
+        self._paused_with_p = self._was_running = self._may_have_restarted = False
         self._shown_at = math.inf
         self._request: Request | None = None
         self._token: object = None
@@ -166,9 +166,11 @@ class ModeManager:
         running_wanted = self._wanted is Wanted.RUNNING
         if self.phase is Phase.PAUSING:
             self._shown_at = now
-        elif self.phase is Phase.RESETTING and continues and not in_flight:
+        elif self.phase is Phase.RESETTING and in_flight:
+            self._may_have_restarted |= not continues  # the next notice proves it by its number
+        elif self.phase is Phase.RESETTING and continues and not self._may_have_restarted:
             self._say(self._board.reset(), now)
-        elif self.phase is Phase.RESETTING and not in_flight:
+        elif self.phase is Phase.RESETTING:
             if self._was_running:  # even after a pause that failed
                 self._wanted = Wanted.RUNNING
             self._begin(now)
@@ -260,7 +262,7 @@ class ModeManager:
 
     def _say(self, packets: Packets, now: float) -> None:
         self.output += packets
-        self._said_at, self._flowed_s = now, 0.0
+        self._said_at, self._flowed_s, self._may_have_restarted = now, 0.0, False
 
     def _settle(self, message: str) -> None:
         self.phase = Phase.SETTLED

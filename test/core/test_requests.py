@@ -11,7 +11,7 @@ from session_bench import OPENING, RESET, START, STOP, Bench
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import StateChanged
 from omnibot_driver.core.requests import Request, RequestDone
-from omnibot_driver.simulator.omnibot import BoardMode
+from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings
 
 
 @pytest.fixture
@@ -159,6 +159,24 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
     bench.run(3.0)
     assert bench.board.mode is BoardMode.PAUSED
     assert [command.kind for command in bench.board.commands].count("reset") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("runs", [True, False])
+def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
+    """The first «Paused» text arrives 0.05 s after R, so it may be older than R.
+
+    The next text continues its numbers, so both show that the board has restarted.
+    """
+    bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
+    bench.open()
+    bench.run_until_state("nominal" if runs else "paused")
+    bench.run(1.5)
+    answer = bench.ask(Request.RESET, 10.0)
+    assert answer.success
+    assert [command.kind for command in bench.board.commands].count("reset") == 1
+    bench.run(1.5)
+    assert bench.session.state == ("nominal" if runs else "paused")
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
