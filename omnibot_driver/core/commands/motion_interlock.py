@@ -80,16 +80,18 @@ class MotionInterlock:
         ``timeout_s``: time without commands, in s, that ends the refusal after a first stop. It
         does not end the refusal after a second stop within 60 s.
         """
-        silent = now - self._commanded_at >= timeout_s
+        reason = "" if stands else self.reason(now, timeout_s)
         if not stands:
             self._commanded_at = now
-        if self.until is Until.RELEASE and (stands or silent):
+        if self.until is Until.RELEASE and not reason:
             self.until = Until.NOTHING
-        return "" if stands or self.until is Until.NOTHING else self.reason(timeout_s)
+        return reason
 
-    def reason(self, timeout_s: float) -> str:
-        """Return the reason why motion is refused, with a remedy; empty if motion is allowed."""
+    def reason(self, now: float, timeout_s: float) -> str:
+        """Return why a motion at ``now`` is refused, with a remedy; empty if it is allowed."""
         if self.until is Until.RELEASE:
+            if now - self._commanded_at >= timeout_s:
+                return ""
             return (
                 "the motion monitor has stopped the robot; send a zero command, or no command for"
                 f" {timeout_s:g} s"

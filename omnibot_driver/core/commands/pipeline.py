@@ -130,7 +130,7 @@ class CommandPipeline:
             estop=self.policy.latched,
             monitored=self.monitored or not self._obeys,
             trips=self.interlock.trips,
-            interlock=self.interlock.reason(self.policy.settings.timeout_s),
+            interlock=self.interlock.reason(now, self.policy.settings.timeout_s),
         )
 
     def begin(self, now: float) -> None:

@@ -22,7 +22,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
     """All commands are accepted as long as the motion monitor has not stopped the robot."""
     interlock = MotionInterlock()
     assert all(arrives(interlock, 0.1 * step) for step in range(20))
-    assert interlock.reason(TIMEOUT_S) == ""
+    assert interlock.reason(2.0, TIMEOUT_S) == ""
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
@@ -102,7 +102,7 @@ def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() ->
     interlock.release()
     assert interlock.until is Until.RELEASE
     interlock.trip(1.0)
-    assert "latch and release the e-stop" in interlock.reason(TIMEOUT_S)
+    assert "latch and release the e-stop" in interlock.reason(2.0, TIMEOUT_S)
     assert not arrives(interlock, 100.0)
     interlock.release()
     assert arrives(interlock, 100.1)

@@ -112,6 +112,20 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
     assert not bench.session.figures(bench.now).commands.interlock
 
 
+def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
+    """No command arrives for ``cmd_vel_timeout`` after the first stop by the motion monitor.
+
+    The next command would be accepted, so ``/diagnostics`` does not show a refusal.
+    """
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    bench.run(0.3)
+    assert bench.session.figures(bench.now).commands.interlock
+    bench.run(0.3)
+    assert bench.session.figures(bench.now).commands.interlock == ""
+    assert try_to_drive(bench, 0.1) == 1
+
+
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
     """The motion monitor has stopped the robot. Then the driver stalls, and loses commands.
 
