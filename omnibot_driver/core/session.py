@@ -127,7 +127,8 @@ class Session:
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
         """Apply new settings to later commands and frames.
 
-        A stricter limit or timeout stops the robot, unless it drives to a goal.
+        A stricter limit or timeout stops the robot, unless it drives to a goal. A new scale of the
+        odometry drops a goal.
 
         ``board``: new settings of the board itself; the current command is encoded again.
         """
@@ -136,6 +137,7 @@ class Session:
             self._board.settings = board
             self._reporter.notify(self._commanding.check_anew(now))
         self._measurement.configure(settings)
+        self._reporter.notify(self._commanding.check_goal([], now))
 
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin a connection, because the port is open now.

@@ -276,13 +276,16 @@ class CommandPipeline:
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 
-        A goal becomes invalid when the origin of the odometry frame moves.
+        A goal becomes invalid when the origin or a scale of the odometry frame changes.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):
             return []
         if goal.alignment != self._odometry.alignments:
-            why = "the origin of odom has changed, by ~/reset_odometry or a restart of the board"
+            why = (
+                "the origin or a scale of odom has changed, by ~/reset_odometry, a restart of the"
+                " board, `odom_linear_scale` or `odom_angular_scale`"
+            )
         elif self._obeys and any(
             goal.is_left_by(estimate.pose)
             for estimate in estimates

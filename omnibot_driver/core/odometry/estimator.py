@@ -90,7 +90,9 @@ class Odometry:
         self.heading_assumed = False
         """Whether heading 0 was assumed because the board sent no pose."""
         self.alignments = 0
-        """Number of times that the odometry frame was moved relative to the board's frame."""
+        """Number of times that the odometry frame was moved or scaled relative to the board's
+        frame."""
+        self._settings = settings
         self._track = PoseTracker(axis_signs)
         self.configure(settings)
         self._board: Pose | None = None
@@ -108,7 +110,11 @@ class Odometry:
 
     def configure(self, settings: OdometrySettings) -> None:
         """Use these settings from the next displacement on."""
-        self._settings = settings
+        before, self._settings = self._settings, settings
+        self.alignments += (before.linear_scale, before.angular_scale) != (
+            settings.linear_scale,
+            settings.angular_scale,
+        )
         self._track.configure(
             settings.noise,
             scale=(settings.linear_scale, settings.angular_scale),

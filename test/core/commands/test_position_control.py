@@ -10,6 +10,7 @@ from robots import push, reconnect
 from session_bench import EMERGENCY_STOP, STOP, Bench, bare
 
 from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.odometry.estimator import OdometrySettings
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
@@ -246,6 +247,30 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
     bench.run(0.5)
     assert {data for _, data in bench.written[start:]} == {STOP}
     assert [text for text in bench.notices if "goal" in text]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", ["linear_scale", "angular_scale"])
+def test_a_new_scale_of_odom_discards_a_goal(bench: Bench, scale: str) -> None:
+    """A scale of odom changes while the robot drives to a goal 3 m ahead.
+
+    The goal would now be at another place of the board's frame, so the driver discards it. A notice
+    says so, and the next goal is accepted.
+    """
+    bench.go_to(3.0, 0.0, 0.5)
+    bench.run(0.2)
+    bench.configure(odometry=bench.settings.odometry)
+    assert bench.notices == []
+    bench.configure(odometry=OdometrySettings(**{scale: 1.5}))
+    bench.run(8.0)
+    assert bench.board.truth.x_m < 0.5
+    (said,) = bench.notices
+    assert "the goal of cmd_pose is discarded" in said
+    assert "scale" in said
+    assert bench.session.figures(bench.now).commands.trips == 0
+    bench.go_to(1.0, 0.0, 0.0)
+    bench.run(4.0)
+    assert where(bench) == pytest.approx((1.0, 0.0, 0.0), abs=0.05)
 
 
 @pytest.mark.parametrize("goal", [(1.0, 0.0, 0.0), (0.3, -0.3, 0.0), (0.0, 0.0, 1.0)])
