@@ -68,7 +68,7 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""Silence in s after which a server whose stop port has hung is regarded as restarted."""
+"""Silence in s after which a server whose stop port has hung may have been restarted."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
@@ -234,7 +234,7 @@ class Ground:
         if (now - self.heard_s > most_s and not busy) or self.health.stranger:
             self._appears(now)
         if now - self.heard_s > RESTARTED_S:
-            self.health.outlived = False
+            self.health.was_silent()
         self.heard_s = now
 
     def _appears(self, now: float) -> None:

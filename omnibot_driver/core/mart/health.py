@@ -18,6 +18,7 @@ from omnibot_driver.core.mart.readings import (
     Side,
     SonarReading,
 )
+from omnibot_driver.core.mart.relative_heading import MOST_RAD, OLD_RAD
 from omnibot_driver.core.mart.replies import Ok
 from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.words import DOCKED, MCSTAT, SFC, SRC, VOLTS, Word
@@ -69,13 +70,14 @@ class Health:
 
     def __init__(self, imu: ImuProof) -> None:
         self._imu = imu
+        self.outlived = self._may_be_restarted = False
+        self._heading_rad: float | None = None
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: nothing is measured yet."""
+        """Begin a new connection: nothing is measured yet. ``outlived`` does not change."""
         self.heading_told: set[Motion] = set()
         self.heading_changes = 0
-        self.outlived = False
         self._defective = False
         self.reference_fails = 0
         self._reference_failed_s = -math.inf
@@ -145,6 +147,36 @@ class Health:
         before, self._status_before = self._status_before, bits
         if bits == before or bits == 0:
             self.status = bits
+
+    def outlives(self, *, certain: bool) -> None:
+        """Record that the server answers a stop only after the stop port was used.
+
+        ``certain``: False if a server that was restarted meanwhile would give the same answer.
+        """
+        if certain or not self.outlived:
+            self.outlived, self._may_be_restarted = True, not certain
+
+    def restarted(self) -> None:
+        """Record that the server was restarted, so that its stop port does not hang."""
+        self.outlived = self._may_be_restarted = False
+        self._heading_rad = None
+
+    def was_silent(self) -> None:
+        """Record that the server may have been restarted; its next heading at rest decides it."""
+        self._may_be_restarted = True
+
+    def rests(self, heading_rad: float) -> None:
+        """Evaluate the heading of a robot at rest, if the server may have been restarted.
+
+        A restarted server reports a heading near zero, or one that differs from the last one.
+        """
+        if not self.outlived or not abs(heading_rad) < MOST_RAD:
+            return
+        before_rad, self._heading_rad = self._heading_rad, heading_rad
+        same = before_rad is None or abs(heading_rad - before_rad) <= OLD_RAD
+        if self._may_be_restarted and not (same and abs(heading_rad) > OLD_RAD):
+            self.restarted()
+        self._may_be_restarted = False
 
     def encoder_failed(self) -> None:
         """Record that the query of the encoder count (ENC) was answered by ``fail``."""

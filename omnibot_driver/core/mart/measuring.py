@@ -48,10 +48,12 @@ class Measuring(Starts):
             before_rad = self.odometry.heading.angle_rad
             changed = self._turned(reply.number, answer.when, now)
             if self._shows_restart(before_rad):
-                self.health.outlived = False
+                self.health.restarted()
                 self.jobs.forget_log()
             elif reply.number and self._started_s < self.appeared_s <= answer.when.from_s:
                 self.jobs.log_may_be_lost = False  # a restarted server reports zero until RM
+            if self.state is State.STILL and not answer.when.doubtful:
+                self.health.rests(math.radians(reply.number))
             certain = answer.when.from_s >= self._begun_s and not answer.when.doubtful
             if changed and certain and self.state in (State.REVERSING, State.TURNING):
                 self.health.heading_changed(self.motion)
