@@ -160,8 +160,8 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock.
 
-        While this clock is 0 or outside the range of ROS time, measurements are not published. The
-        clock may also jump back.
+        While this clock is 0 or outside the range of ROS time, measurements are not published, but
+        requests are answered. The clock may also jump back.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -170,7 +170,8 @@ class Publishing:
         offset_ns = now_ns - time.monotonic_ns()
         for event in events:
             kind = type(event)
-            if not isinstance(event, ImuEstimate | OdometryEstimate | Extra):
+            answers = isinstance(event, Extra) and isinstance(event.value, RequestDone)
+            if answers or not isinstance(event, ImuEstimate | OdometryEstimate | Extra):
                 self._handlers[kind](event, offset_ns)
             elif 0 < now_ns < LATEST_NS:
                 steady_ns = round(event.stamp_s * 1e9)

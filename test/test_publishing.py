@@ -15,14 +15,17 @@ import rclpy
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.serialization import deserialize_message
+from rclpy.task import Future
 from rclpy.time import Time
 from sensor_msgs.msg import Imu, JointState
 
 from omnibot_driver import boards, parameters
 from omnibot_driver.boards import omnibot
 from omnibot_driver.core.events import Extra
+from omnibot_driver.core.fejemis import JobDone as FejemisDone
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.mart.readings import JobDone as MartDone
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.omnibot import PausedFrame
@@ -171,6 +174,27 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
     for stamped in stamps_ns.values():
         assert all(stamp_ns < 3 * 10**9 for stamp_ns in stamped[12:])
         assert all(earlier < later for earlier, later in pairwise(stamped[12:]))
+
+
+def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
+    """The simulated clock has not begun. The result of a board's own request is passed on.
+
+    A measurement that only this board has is not published, because it would need a stamp.
+    """
+    node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
+    _, publishing = session_with(node)
+    published: list[Charge] = []
+    publishing.extras = {
+        MartDone: lambda done, _ns: done.token.set_result(done),
+        FejemisDone: lambda done, _ns: done.token.set_result(done),
+        Charge: lambda charge, _ns: published.append(charge),
+    }
+    for kind in (MartDone, FejemisDone):
+        token = Future()
+        publishing.deliver([Extra(Charge(12.5), 2.0), Extra(kind(token, True, "done"), 2.0)])
+        assert token.done()
+    assert not published
+    publishing._time_watch.unregister()  # otherwise rcl calls the destroyed watch
 
 
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(

@@ -10,6 +10,7 @@ from enum import Enum
 from typing import Literal
 
 from omnibot_driver.core.readings import Vector3
+from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.values import value
 
 RangeName = Literal["tof", "sonar", "ir1", "ir2"]
@@ -86,12 +87,8 @@ class RangeReading:
 
 
 @dataclass(frozen=True, slots=True)
-class JobDone:
+class JobDone(RequestDone):
     """Result of a job.
 
     ``token``: the object by which the caller identifies the job.
     """
-
-    token: object
-    success: bool
-    message: str

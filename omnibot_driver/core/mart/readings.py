@@ -5,6 +5,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from omnibot_driver.core.requests import RequestDone
+
 Side = Literal["front", "rear"]
 
 
@@ -34,7 +36,7 @@ class DockedReading:
 
 
 @dataclass(frozen=True, slots=True)
-class JobDone:
+class JobDone(RequestDone):
     """The result of a job, such as a gyro calibration, a docking move or a download.
 
     ``token``: the object by which the caller recognises the job.
@@ -42,8 +44,5 @@ class JobDone:
     ``name``, ``content``: of the downloaded file; empty without a file.
     """
 
-    token: object
-    success: bool
-    message: str
     name: str = ""
     content: bytes = b""
