@@ -183,6 +183,8 @@ class Jobs:
         elif reply.form is Form.FILE:
             self._name, self._size = reply.file
             self._piece_s = now + QUIET_S
+        elif job is Job.LOG_FILE:
+            self._finish(False, f"the server has ended without sending a file; {COPY}")
         else:
             if job is Job.LOG:
                 self.logging, self.log_may_be_lost = True, False

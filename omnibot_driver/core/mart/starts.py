@@ -264,6 +264,8 @@ class Starts(FailedStarts):
                 return NO_PACKETS
             if not self.imu.fresh(now):
                 return self._check(now)
+        elif now < self.conversation.certain_from_s(request.word):
+            return NO_PACKETS  # a copy of another reply could look like the reply to the request
         if Form.FILE in request.word.forms:
             if now < self._file_s + 2 * self._delay_s:
                 return NO_PACKETS  # a copy of the last request would bring another file

@@ -179,3 +179,69 @@ def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     bench.command(0.0, 0.0, 4.0)
     assert lost
     assert bench.job(Job.LOG_FILE).success
+
+
+def with_a_copy_of_the_last_ok(bench: MartBench, job: Job) -> JobDone:
+    """Return the result of ``job``, after a copy of an earlier ``ok``. Replies take 0.1 s."""
+    bench.board.ask(job, "token", bench.now)
+    bench.run(0.01)  # the reply to the pending query comes
+    inner, coming = bench.robot.advance, list[tuple[float, Packet]]()
+
+    def advance() -> list[Packet]:
+        coming.extend((bench.now + 0.1, packet) for packet in inner())
+        out = []
+        while coming and coming[0][0] <= bench.now:
+            out.append(coming.pop(0)[1])
+        return out
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+    bench.run(0.05)
+    bench.session.inbound.receive(b"ok", bench.now, 0)
+    bench.settle()
+    bench.run(10.0)
+    return bench.extras(JobDone)[-1]
+
+
+def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
+    """A gyro calibration ends with ``ok``, and the log is requested at once.
+
+    A copy of the ``ok`` arrives before the server's reply to EXIT. The log is downloaded
+    nevertheless.
+    """
+    bench = MartBench().ready()
+    assert bench.job(Job.LOG).success
+    assert bench.job(Job.BIAS).success
+    done = with_a_copy_of_the_last_ok(bench, Job.LOG_FILE)
+    assert done.success, done
+    assert done.content
+
+
+def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
+    """A gyro calibration ends with ``ok``. The request that starts the log is lost.
+
+    A copy of the ``ok`` arrives. The driver does not take it for the reply to LOG, so it does not
+    end a server that keeps no log.
+    """
+    bench = MartBench().ready()
+    assert bench.job(Job.BIAS).success
+    inner = bench.robot.receive
+    bench.robot.receive = lambda data, now, channel: (  # type: ignore[method-assign]
+        None if data == b"LOG" else inner(data, now, channel)
+    )
+    assert not with_a_copy_of_the_last_ok(bench, Job.LOG).success
+    with pytest.raises(RequestRefused, match="start_log"):
+        bench.board.ask(Job.LOG_FILE, "token", bench.now)
+
+
+def test_a_server_that_ends_without_a_file_has_not_sent_its_log() -> None:
+    """The server keeps no log any more, and answers EXIT with a bare ``ok``.
+
+    The download fails, and its result says that the server has ended.
+    """
+    bench = MartBench("documented").ready()
+    assert bench.job(Job.LOG).success
+    bench.server.log = None
+    done = bench.job(Job.LOG_FILE)
+    assert bench.server.crashed
+    assert not done.success
+    assert "without sending" in done.message
