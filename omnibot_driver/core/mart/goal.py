@@ -45,7 +45,10 @@ It is a fraction of the initial allowed error. Without the increase, the robot c
 forth, because turns overshoot.
 """
 MOST_MOVES: Final = 9
-"""Largest number of moves to one goal. After them, the driver gives the goal up."""
+"""Largest number of moves to one goal, from the last long straight move on (``Move.cut``).
+
+After them, the driver gives the goal up.
+"""
 
 
 class Surplus:
@@ -113,12 +116,14 @@ def docking_inches(longest_m: float) -> int:
 class Move:
     """The progress towards the goal ``place``.
 
-    ``said``: number of moves sent so far.
+    ``said``: number of moves sent so far, from the last long straight move on (``cut``).
 
     ``turns``: number of turns since the last straight move.
 
-    ``given_up``: whether the driver sends no further move, because the robot has arrived, a move
-    has failed, or MOST_MOVES moves were sent.
+    ``given_up``: whether the driver sends no further move, because the robot has arrived, or the
+    goal has failed.
+
+    ``failed``: whether a move has failed, or MOST_MOVES moves did not reach the goal.
     """
 
     place: Pose
@@ -128,7 +133,7 @@ class Move:
     failed: bool = False
 
     def fail(self) -> None:
-        """Give the goal up, because a move has failed."""
+        """Give the goal up, because it was not reached."""
         self.given_up = self.failed = True
 
     def repeated(self) -> "Move":
@@ -143,6 +148,13 @@ class Move:
             return Move(self.place)
         return Move(self.place, said=ENOUGH_MOVES, turns=self.turns)
 
+    def cut(self) -> None:
+        """Begin to count anew, because the driver has stopped a straight move that took too long.
+
+        The server needs more than one move for a goal far away.
+        """
+        self.said = self.turns = 0
+
     def begin(self, request: Request) -> None:
         """Count this move as sent."""
         self.said += 1
@@ -154,7 +166,7 @@ def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) 
 
     Return None if the robot is at the goal, or if the goal is given up.
     """
-    if move.given_up or move.said >= MOST_MOVES:
+    if move.given_up:
         return None
     way = pose.way_to(move.place)
     near_rad = NEAR_RAD * (1.0 + WIDER * move.turns)

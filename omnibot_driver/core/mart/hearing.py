@@ -182,6 +182,8 @@ class Hearing(Measuring):
         elif word.kind is Kind.START:
             self._halt(now, f"the controller did not answer {word.text}")
         elif word.kind is Kind.MOVE:
+            if self._move is not None and self.motion is Motion.STRAIGHT:
+                self._move.cut()
             self._halt(now)  # the reply is lost or late; the rest of the goal is planned again
         elif word.kind is Kind.CHECK:
             self.state = State.STILL

@@ -14,7 +14,7 @@ from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.asking import Asking
 from omnibot_driver.core.mart.finished_move import FULL, Done
-from omnibot_driver.core.mart.goal import INCH_M, Move, next_move
+from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, Move, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
@@ -54,10 +54,13 @@ class Moves(Asking):
         move = self._move
         if move is None:
             return "none"
+        left = self._left(move)
+        return f"over, {left} away" if move.given_up else f"move {move.said}, {left} away"
+
+    def _left(self, move: Move) -> str:
         way = self.odometry.pose.way_to(move.place)
         turn_deg = math.degrees(math.remainder(way.yaw_rad, math.tau))
-        left = f"{way.way_m:.2f} m and {turn_deg:.0f}° away"
-        return f"over, {left}" if move.given_up else f"move {move.said}, {left}"
+        return f"{way.way_m:.2f} m and {turn_deg:.0f}°"
 
     def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
         if self.jobs.job is Job.TURN_RECORD:
@@ -67,6 +70,13 @@ class Moves(Asking):
         request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
         if request is None:
             self._move.given_up = True  # the goal is over, even if the robot is pushed away
+            return None
+        if self._move.said >= MOST_MOVES:
+            self._move.fail()
+            left = self._left(self._move)
+            self._notice(
+                f"goal not reached after {MOST_MOVES} moves: {left} left{DISCARDED}", halt=True
+            )
             return None
         if request.word in NEEDS_IMU and not self.imu.fresh(now):
             return request

@@ -298,6 +298,36 @@ def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the
     assert surplus.inches(2.0, slow=False) == inches
 
 
+def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
+    """The network loses every straight move to a goal, so the robot stays where it is.
+
+    After MOST_MOVES moves, the driver gives the goal up, and says how far away it is.
+    """
+    bench = MartBench().ready()
+    receive = bench.robot.receive
+    bench.robot.receive = lambda data, now, channel: (  # type: ignore[method-assign]
+        None if data.startswith(b"TF") else receive(data, now, channel)
+    )
+    bench.go_to(0.5, 0.0, 0.0)
+    bench.run(60.0)
+    assert sum(data.startswith(b"TF") for data in bench.said()) == MOST_MOVES
+    assert any("goal not reached after 9 moves: 0.50 m" in notice for notice in bench.notices)
+
+
+def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
+    """A goal is 30 m away. The driver stops the straight move after 80 s, which is about 20 m.
+
+    The moves to the goal are counted anew from then on, so a goal at any distance can be reached.
+    """
+    bench = MartBench().ready()
+    bench.go_to(30.0, 0.0, 0.0)
+    bench.run_until(lambda: sum(data.startswith(b"TF") for data in bench.said()) == 2, 100.0)
+    assert bench.board._pilot.goal_progress.startswith("move 1, ")
+    bench.run_until(lambda: bench.board._pilot.goal_progress.startswith("over"), 100.0)
+    bench.run(0.2)
+    assert bench.odometry[-1].pose.x_m == pytest.approx(30.0, abs=0.1)
+
+
 @pytest.mark.parametrize("x_m", [1e4, 1e9, 1e60, 1e308, -1e300])
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
     """A goal is more than 1000 m away, and its command could be too long for a request.
