@@ -32,6 +32,8 @@ EARLIES_WITHIN_S: Final = 1.0
 """Time in s. If three lines (``AGAIN``) within this time seem to arrive early, the clock began with
 a late line, and must begin again. The three lines need not come in a row: a line between them may
 seem right, because it is late too."""
+FASTEST: Final = 1.001
+"""How fast a board's clock runs at most, as a multiple of the host's."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two timestamps of one kind of reading.
 
@@ -121,8 +123,11 @@ class TeensyClock:
         # Lines that arrive in a shorter time may only have waited for a stalled host.
         if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
-        # A later board time does not show a restart: the earlier lines arrived late.
-        self.restarted = board_s < self._last_s
+        # A board that restarted after its last line cannot have run for longer than the time since
+        # then. A board that did not restart has run for longer; its lines only arrive late.
+        assert self._fit is not None
+        since_s = now - self.host_s(self._last_s)
+        self.restarted = board_s < max(self._last_s, since_s * FASTEST)
         self._begin_at(board_s, now)
         return True
 

@@ -110,6 +110,47 @@ def test_every_restart_stops_the_robot_and_is_reported(
     assert_odometry_is_right(bench, 0.02)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("away_s", [0.5, 20.0])
+def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grown(
+    away_s: float,
+) -> None:
+    """The drive board restarts while its port is away, and its pose begins at zero again.
+
+    When the port is back, the board has run for ``away_s``: shorter or longer than before the
+    restart. The odometry does not jump in either case.
+    """
+    bench = nominal()
+    bench.drive_on(0.3, 0.0, 3.0)
+    bench.run(1.5)
+    before = bench.odometry[-1].pose
+    bench.close()
+    bench.speaks = bench.hears = set()
+    bench.robot.drive.reboot()
+    bench.run(away_s)
+    bench.speaks, bench.hears = {DRIVE, FRONT}, {DRIVE, FRONT}
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    assert before.way_to(bench.odometry[-1].pose).way_m < 0.02
+    assert any("drive board has restarted" in text for text in bench.notices)
+    assert not any("front board has restarted" in text for text in bench.notices)
+
+
+@pytest.mark.slow
+def test_a_port_that_was_away_for_long_is_no_restart() -> None:
+    """The port is away for longer than the boards had run before. The boards have not restarted."""
+    bench = nominal()
+    bench.close()
+    bench.speaks = bench.hears = set()
+    bench.run(20.0)
+    bench.speaks, bench.hears = {DRIVE, FRONT}, {DRIVE, FRONT}
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    assert not any("restarted" in text for text in bench.notices)
+
+
 FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 
 
