@@ -180,6 +180,8 @@ class FejemisTopics:
             answer = Future()
 
             def ask(session: Session, now: float) -> None:
+                if why := _why_not_request(job.value, session):
+                    raise RequestRefused(why)
                 cast(FejemisBoard, session.board).services.ask(job, answer, now)
 
             try:
@@ -218,7 +220,7 @@ class FejemisTopics:
 
         def lift(session: Session, message: Float32, now: float) -> None:
             board = cast(FejemisBoard, session.board)
-            if message.data and (why := _why_not_connected("lift_cmd", session)):
+            if message.data and (why := _why_not_request("lift_cmd", session)):
                 raise CommandRefused(why)
             board.services.lift(message.data, now)
 
@@ -246,17 +248,18 @@ class FejemisTopics:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
         ``what``: name of the topic or device, which the reason contains. ``off``: whether the
-        action switches something off. Switching off is allowed without a connection.
+        action switches something off. Such an action is never refused, but the reason says if a
+        port is not open.
         """
 
         def say(session: Session, now: float) -> str:
-            if not off and (why := _why_not_connected(what, session)):
+            if not off and (why := _why_not_request(what, session)):
                 return why
             try:
                 action(cast(FejemisBoard, session.board).services, now)
             except RequestRefused as error:
                 return str(error)
-            return ""
+            return _why_not_off(what, session) if off else ""
 
         trouble: str = self._link.call(say)
         return trouble
@@ -265,11 +268,19 @@ class FejemisTopics:
         self._node.get_logger().warning(text, throttle_duration_sec=WARN_EVERY_S)
 
 
-def _why_not_connected(what: str, session: Session) -> str:
-    """Return why ``what``, a topic or device, is refused; empty if the boards are connected."""
-    if session.state in ("disconnected", "connecting"):
-        return f"{what} refused: {session.board.refusal or NOT_CONNECTED}"
-    return ""
+def _why_not_request(what: str, session: Session) -> str:
+    """Return why ``what``, a topic, device or job, is refused now; empty if it is not."""
+    why: str = session.interlocks.why_not_request()
+    if not why and session.state in ("disconnected", "connecting"):
+        why = session.board.refusal or NOT_CONNECTED
+    return f"{what} refused: {why}" if why else ""
+
+
+def _why_not_off(what: str, session: Session) -> str:
+    """Return why ``what``, now switched off, may still be on; empty if all ports are open."""
+    why = NOT_CONNECTED if session.state == "disconnected" else session.interlocks.missing
+    later = "the driver switches it off again when all ports are open"
+    return f"{what} may still be on: {why}; {later}" if why else ""
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:

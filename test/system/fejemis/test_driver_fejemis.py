@@ -198,6 +198,24 @@ def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> 
         robot.stands_for_good()
 
 
+def test_a_driver_that_ends_does_not_move_the_lift_again(new: New) -> None:
+    """Lift commands continue while the driver stops the robot and ends.
+
+    After the driver has switched the lift off, it sends no voltage.
+    """
+    robot, driver, probe = new
+    lift = probe.publisher(Float32, "lift_cmd")
+    probe.node.create_timer(0.02, lambda: lift.publish(Float32(data=6.0)))
+    with driven(probe, robot):
+        robot.wait_until(lambda board: board.vehicle.lift.volts > 0.0)
+        before = robot.do(lambda board: len(board.front.commands))
+        driver.process.send_signal(signal.SIGINT)
+        robot.stands_for_good()
+    texts = [obeyed.text for obeyed in robot.do(lambda board: list(board.front.commands))[before:]]
+    after = texts[texts.index("motv 0 0") :]
+    assert {text for text in after if text.startswith("motv")} == {"motv 0 0"}
+
+
 def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
     """The services that calibrate, and those that save and load the configuration, all succeed."""
     for service in ("calibrate_gyro", "calibrate_accelerometer", "save_configuration"):

@@ -14,7 +14,7 @@ import pytest
 from driver_process import Driver
 from fejemis_driver import driven, moves_again, robot_of, started
 from probe import Probe
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 from two_ports import DRIVE, FRONT, TwoPorts
 
 from omnibot_driver.simulator.fejemis import Firmware
@@ -47,6 +47,45 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     assert not robot.do(lambda board: board.vehicle.brush)
     subscriptions = robot.do(lambda board: board.half(name).subscriptions)
     assert len(subscriptions) > 1
+    moves_again(probe, robot)
+
+
+def test_a_brush_that_cannot_be_switched_off_now_is_no_success(
+    robot: TwoPorts, driver: Driver, probe: Probe
+) -> None:
+    """The front board is unplugged while the brush is on, and the user switches the brush off.
+
+    The answer names the missing port. When the board is back, the brush is off.
+    """
+    assert probe.call(SetBool, "brush", data=True).success
+    robot.wait_until(lambda board: board.vehicle.brush)
+    robot.unplug(FRONT)
+    probe.wait_for_state("connecting")
+    answer = probe.call(SetBool, "brush", data=False)
+    assert not answer.success
+    assert "the port 'front' is missing" in answer.message
+    assert robot.do(lambda board: board.vehicle.brush)
+    robot.plug(FRONT)
+    robot.wait_until(lambda board: not board.vehicle.brush)
+    probe.wait_for_state("nominal")
+
+
+def test_nothing_is_promised_while_both_ports_are_missing(
+    robot: TwoPorts, driver: Driver, probe: Probe
+) -> None:
+    """Both boards are unplugged. Neither a job nor ``~/brush`` (off) is answered as a success."""
+    robot.unplug(DRIVE)
+    robot.unplug(FRONT)
+    probe.wait_for_state("disconnected")
+    answers = [
+        probe.call(SetBool, "brush", data=False),
+        probe.call(Trigger, "save_configuration"),
+    ]
+    assert [answer.success for answer in answers] == [False, False]
+    assert all("the boards are not connected" in answer.message for answer in answers)
+    robot.plug(DRIVE)
+    robot.plug(FRONT)
+    probe.wait_for_state("nominal")
     moves_again(probe, robot)
 
 
