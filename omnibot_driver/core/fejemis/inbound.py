@@ -50,6 +50,7 @@ class Inbound:
         self.mode = Mode.UNKNOWN
         self.relay_rad: float | None = None
         self._front_unheard = True
+        self._trouble = ""
         self.watch.begin()
 
     def take_relay(self) -> float | None:
@@ -128,8 +129,10 @@ class Inbound:
                 " in this order too",
                 now,
             )
-        if trouble := self._ports.trouble:
-            self._told.halt(f"{trouble}; robot stopped", now)
+        before, self._trouble = self._trouble, self._ports.trouble
+        if self._trouble:
+            notify = self._told.tell if self._trouble == before else self._told.halt
+            notify(f"{self._trouble}; robot stopped", now)
         if half.role != "drive":
             return
         self._obedience.hear(message.state)

@@ -46,6 +46,8 @@ class Watch:
     def begin(self) -> None:
         """Forget earlier timeouts, because new connections begin."""
         self.blind = self.unposed = self._sick = self._stalled = False
+        self._missed = [False, False]
+        """For each port: whether the user was notified that its board is missing."""
         self._begun_at = math.inf
         self._patient_until = -math.inf
         self._looked_at = self._heard_at = self._unread_until = -math.inf
@@ -94,8 +96,11 @@ class Watch:
         if role is None or half.heartbeat is None:
             other = self._ports.halves[1 - channel]
             heard = other.role is not None and other.heartbeat is not None
-            if silent and now - self._begun_at > UNHEARD_S and heard:
-                self._told.halt(
+            was_missed = self._missed[channel]
+            self._missed[channel] = silent and now - self._begun_at > UNHEARD_S and heard
+            if self._missed[channel]:
+                notify = self._told.tell if was_missed else self._told.halt
+                notify(
                     f"no data from the {self._ports.role(channel)} board at `{parameter}`; check"
                     " its power and cable",
                     now,

@@ -189,6 +189,27 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("estop", [False, True])
+@pytest.mark.parametrize(("ids", "speaks"), [((90, 91), {DRIVE}), ((90, 90), {DRIVE, FRONT})])
+def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
+    ids: tuple[int, int], speaks: set[int], *, estop: bool
+) -> None:
+    """One board never sends anything, or both ports lead to a drive board.
+
+    Stop is sent for 5 s at most. Afterwards, the driver sends only the Stops with which it tries to
+    start the robot, twice in a second. A latched e-stop is repeated 20 times in a second.
+    """
+    bench = Bench(Simulated(ids=ids))
+    bench.speaks = speaks
+    bench.open()
+    bench.estop(estop)
+    bench.run(9.0)
+    mark = bench.now
+    bench.run(1.0)
+    assert bench.lines(DRIVE, mark).count("rc 2 0 0") <= (22 if estop else 5)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
     """After a reconnect one port is silent. The driver remembers which board was at this port.
