@@ -42,12 +42,15 @@ class ImuSamples:
 
     def __init__(self, unit: AccelerationUnit) -> None:
         self.unit: AccelerationUnit = unit
-        self.rates: Vector3 = (math.nan,) * 3
-        self.forces: Vector3 = (math.nan,) * 3
         self.begin()
 
     def begin(self) -> None:
-        """Forget the phase of the sampling times, because the board's streams start again."""
+        """Forget the last sample and the phase of the sampling times.
+
+        The caller calls this method when the board's streams start again.
+        """
+        self.rates: Vector3 = (math.nan,) * 3
+        self.forces: Vector3 = (math.nan,) * 3
         self._count = 0
         self._arrived_s = -math.inf
         self._phase_s: float | None = None

@@ -40,8 +40,7 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Age of the last IMU sample, in s, up to which an orientation gets the timestamp of this sample.
-"""
+"""Age of the last IMU sample, in s, up to which an orientation is published with this sample."""
 
 
 class Translation:
@@ -162,15 +161,14 @@ class Translation:
         self.stamped.add(self._imu.reading(pair), stamp_s, pair.at)
 
     def _orient(self, message: Attitude, came_at: float, now: float) -> None:
-        if math.isnan(self._imu.rates[0]):
+        if math.isnan(self._imu.rates[0]) or came_at - self._imu_at >= PERIOD_S:
             return
         oriented = OrientedImuReading(
             quaternion(message.roll_rad, message.pitch_rad, message.yaw_rad),
             self._imu.rates,
             self._imu.forces,
         )
-        fresh = came_at - self._imu_at < PERIOD_S
-        self.stamped.add(ExtraReading(oriented), self._imu_stamp_s if fresh else came_at, now)
+        self.stamped.add(ExtraReading(oriented), self._imu_stamp_s, now)
 
     def _battery(self, message: Battery, now: float) -> None:
         low = message.cells > 0 and message.volts < message.cells * self._settings.low_cell_v

@@ -3,7 +3,7 @@
 """Tests of what the sensors of the Teensy boards measure, in SI units."""
 
 import pytest
-from fejemis_bench import nominal
+from fejemis_bench import DRIVE, FRONT, nominal
 
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
@@ -34,6 +34,35 @@ def test_all_sensors_are_told_in_si_units() -> None:
     ranges = {reading.name: reading.distance_m for reading in bench.extras(RangeReading)}
     assert ranges == pytest.approx({"tof": 0.3, "sonar": 0.3, "ir1": 0.3, "ir2": 0.3}, abs=0.01)
     assert bench.extras(SteeringReading)[-1].angle_rad == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.slow
+def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
+    """The port is lost while the robot turns at 1 rad/s. It is back after the robot has stopped."""
+    bench = nominal()
+    bench.drive_on(0.0, 1.0, 2.0)
+    assert bench.extras(OrientedImuReading)[-1].angular_velocity[2] > 0.9
+    bench.close()
+    bench.robot.receive(b"rc 2 0 0\n", bench.now, DRIVE)
+    bench.speaks = set()
+    bench.run(2.0)
+    bench.speaks = {DRIVE, FRONT}
+    bench.events.clear()
+    bench.open()
+    bench.run(0.2)
+    rates = [reading.angular_velocity[2] for reading in bench.extras(OrientedImuReading)]
+    assert len(rates) >= 8
+    assert max(map(abs, rates)) < 0.1
+
+
+def test_an_orientation_without_a_recent_imu_sample_is_not_published() -> None:
+    """The gyro's lines are lost, but the orientations arrive. The last turn rate is not used."""
+    bench = nominal()
+    bench.robot.drive._items["gyro"] = lambda: "lost"
+    bench.run(0.1)
+    bench.events.clear()
+    bench.run(0.2)
+    assert not bench.extras(OrientedImuReading)
 
 
 def test_a_low_battery_is_not_told_with_each_message() -> None:
