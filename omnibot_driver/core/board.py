@@ -214,12 +214,13 @@ class Board(Protocol):
         These packets must work in any state of the board.
         """
 
-    def start_requested(self) -> None:
+    def start_requested(self) -> str:
         """Record that the user has requested a start. The driver calls ``start`` next.
 
-        Not called for the driver's own starts, e.g. after a reconnect.
+        Return why ``start`` cannot start a paused board now, with a remedy; empty if it can. Not
+        called for the driver's own starts, e.g. after a reconnect.
         """
-        return
+        return ""
 
     def start(self) -> Packets:
         """Return the packets that start the board from any mode. They may be sent repeatedly."""

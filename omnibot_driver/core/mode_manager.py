@@ -139,9 +139,12 @@ class ModeManager:
         self._request, self._token = request, token
         self._deadline = now + ANSWER_WITHIN_S
         if request is Request.START:
+            why_not, running = self._board.start_requested(), self._board.mode.running
+            if why_not and not running:
+                self._answer(False, why_not)
+                return
             self._wanted = Wanted.RUNNING
-            self._board.start_requested()
-            if self._board.mode.running:
+            if running:
                 self.phase = Phase.SETTLED
                 self._say(self._board.start(), now)
             else:

@@ -267,13 +267,17 @@ class FejemisBoard(Board):
         """Return a Stop for both boards, and the lines that switch lift and brush off."""
         return self.stop() + self._all_off()
 
-    def start_requested(self) -> None:
+    def start_requested(self) -> str:
         """Forget that the front wheel did not reach its angle, and cancel a requested power-off.
 
-        This happens whenever the user calls ~/start, even during an e-stop.
+        This happens whenever the user calls ~/start, even during an e-stop. Then, return why the
+        board cannot be started.
         """
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()
+        if self._obedience.estopped:
+            return "the e-stop is latched; release it with ~/estop (data: false), then call again"
+        return ""
 
     def start(self) -> Packets:
         """Return a Stop and then ``start``; return no packets during an e-stop.

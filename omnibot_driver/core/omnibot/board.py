@@ -237,8 +237,9 @@ class OmniBot:
         """Return Stop; the zero bytes before it wake the board."""
         return packed(STOP)
 
-    def start_requested(self) -> None:
+    def start_requested(self) -> str:
         """Do nothing: ``start`` is the same, whether the user or the driver requests the start."""
+        return ""
 
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""

@@ -130,3 +130,23 @@ def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
     bench.run(4.0)
     with pytest.raises(CommandRefused, match="no data from the boards; check their power"):
         bench.drive()
+
+
+def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() -> None:
+    """The robot is paused and the e-stop is latched when the user calls ~/start.
+
+    The answer names the e-stop. The robot stays paused after the release, until the next ~/start.
+    """
+    bench = nominal()
+    assert bench.ask(Request.PAUSE).success
+    bench.estop(True)
+    mark = bench.now
+    answer = bench.ask(Request.START)
+    assert not answer.success
+    assert "release it with ~/estop" in answer.message
+    assert bench.now - mark < 0.1
+    bench.estop(False)
+    bench.run(2.0)
+    assert "start" not in bench.lines(DRIVE, mark)
+    assert bench.session.state == "paused"
+    assert bench.ask(Request.START).success
