@@ -99,16 +99,20 @@ class SetpointStream:
         """Record that the packets of a request were written, and adapt what to send next.
 
         The board may hold an incomplete motion frame, whose last bytes were lost. Packets other
-        than Stop can complete this frame to a wrong motion, so the set-point is repeated at once.
+        than Stop can complete this frame to a wrong motion. Stop ends the motion in effect. So a
+        set-point that is a motion is repeated at once.
         """
         if self._heard is not None:
             self._heard(packets, now)
         first = dict(reversed(packets))
-        if all(first.get(channel, b"").startswith(stop) for channel, stop in self._encoder.stop()):
+        stops = all(
+            first.get(channel, b"").startswith(stop) for channel, stop in self._encoder.stop()
+        )
+        if stops:
             self._note_stop(now)
             if self._standing is not EMERGENCY_STOP:
                 self._urgent = False
-        elif self._motion is not None:
+        if self._motion is not None and not (stops and self._motion.is_zero):
             self._said_at = -math.inf
 
     def due(self, now: float) -> Packets:

@@ -5,6 +5,7 @@
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
@@ -150,3 +151,20 @@ def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() 
     assert "start" not in bench.lines(DRIVE, mark)
     assert bench.session.state == "paused"
     assert bench.ask(Request.START).success
+
+
+def test_a_start_of_a_driven_robot_interrupts_its_motion_only_for_a_moment() -> None:
+    """The user calls ~/start while the robot drives. The command is repeated once in a second.
+
+    A Stop precedes ``start``. The motion command follows at once.
+    """
+    bench = nominal(commands=CommandSettings(timeout_s=60.0, rate_hz=1.0))
+    bench.drive()
+    bench.run(1.2)
+    mark = bench.now
+    bench.session.request(Request.START, None, bench.now)
+    bench.settle()
+    bench.run(0.02)
+    rest = bench.lines(DRIVE, mark)
+    rest = rest[rest.index("start") :]
+    assert [text for text in rest if text.startswith("rc 2") and text != "rc 2 0 0"]
