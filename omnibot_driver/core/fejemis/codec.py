@@ -204,12 +204,21 @@ def _words(keyword: str) -> Parse:
 
 def _wheels(fields: list[str]) -> Message | None:
     found = numbers(fields, LENGTH, LENGTH, (1e-3, 1e4), (1, 1e6), LENGTH, (0, 10))
-    return None if found is None else WheelConfiguration(*found)
+    if found is None:
+        return None
+    left_m, right_m, gear, ticks, track_m, period_s = found
+    digits = _digits(fields[:6])
+    return WheelConfiguration(left_m, right_m, gear, ticks, track_m, period_s, digits)
 
 
 def _steering(fields: list[str]) -> Message | None:
     found = numbers(fields, LENGTH, LENGTH)
-    return None if found is None else SteeringConfiguration(*found)
+    return None if found is None else SteeringConfiguration(found[0], found[1], _digits(fields[:2]))
+
+
+def _digits(fields: list[str]) -> tuple[float, ...]:
+    """Return the unit of each field's last digit: 0.001 for "0.420"."""
+    return tuple(10.0 ** -max(0, decimals_of(field)) for field in fields)
 
 
 STATUS: Final = {

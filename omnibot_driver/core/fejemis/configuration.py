@@ -38,8 +38,11 @@ EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
 """Largest accepted relative difference between a written number and the number that the board
-reports. Boards print few digits."""
+reports, or ``DIGIT`` if that is larger. Boards print few digits."""
 DIGIT: Final = 6e-4
+HALF: Final = 0.51
+"""The same in units of the last digit that the board prints, if this is smaller: half a unit, and a
+little more, because the board's numbers have single precision."""
 
 
 class Configuration:
@@ -54,6 +57,8 @@ class Configuration:
         self._once: dict[str, tuple[float, ...]] = {}
         """Numbers that the board reported last, by the keyword of the line. They may still need
         confirmation by a second, equal report."""
+        self._digits: dict[str, tuple[float, ...]] = {}
+        """Units of the numbers' last digits in the last line, by its keyword."""
         self.turned = False
         """Whether the board's ``confs`` line (steering geometry) begins with the track.
 
@@ -129,8 +134,10 @@ class Configuration:
         match message:
             case WheelConfiguration():
                 key, numbers = "conf", message.numbers
+                self._digits[key] = message.digits
             case SteeringConfiguration():
                 key, numbers = "confs", (message.first_m, message.second_m)
+                self._digits[key] = message.digits
             case FrontWheelOffset():
                 key, numbers = "fwo", (message.offset_deg, float(message.inverted))
             case Infrared():
@@ -175,14 +182,15 @@ class Configuration:
 
     def _agrees(self, setting: Written, readings: Mapping[str, tuple[float, ...]]) -> bool:
         told = readings.get(_REPORT[setting])
+        digits = self._digits.get(_REPORT[setting], ())
         wanted = self.written[setting]
         if told is None:
             return False
         if setting is Written.STEERING and not self.turned:
-            told = told[::-1]
+            told, digits = told[::-1], digits[::-1]
         if setting is Written.ACCELEROMETER:
             wanted = wanted[:3]
-        return _near(told, wanted)
+        return _near(told, wanted, digits)
 
 
 def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
@@ -191,11 +199,17 @@ def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
     return f"{setting.command} {words}".encode("ascii")
 
 
-def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
-    """Return whether the board's numbers equal the wanted ones, except for rounding."""
+def _near(
+    told: tuple[float, ...], wanted: tuple[float, ...], digits: tuple[float, ...] = ()
+) -> bool:
+    """Return whether the board's numbers equal the wanted ones, except for rounding.
+
+    ``digits``: the units of the last digits that the board prints; empty if unknown.
+    """
+    exact = digits or (math.inf,) * len(wanted)
     return len(told) >= len(wanted) and all(
-        abs(one - other) <= max(DIGIT, NEAR * abs(other))
-        for one, other in zip(told, wanted, strict=False)
+        abs(one - other) <= min(HALF * digit, max(DIGIT, NEAR * abs(other)))
+        for one, other, digit in zip(told, wanted, exact, strict=False)
     )
 
 

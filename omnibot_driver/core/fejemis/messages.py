@@ -123,7 +123,10 @@ class Infrared:
 
 @value(frozen=True, slots=True)
 class WheelConfiguration:
-    """``conf``: wheel radii, gear, encoder ticks per revolution, track, and control period."""
+    """``conf``: wheel radii, gear, encoder ticks per revolution, track, and control period.
+
+    ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
+    """
 
     left_radius_m: float
     right_radius_m: float
@@ -131,6 +134,7 @@ class WheelConfiguration:
     ticks_per_revolution: float
     track_m: float
     period_s: float
+    digits: tuple[float, ...] = ()
 
     @property
     def numbers(self) -> tuple[float, ...]:
@@ -149,10 +153,13 @@ class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
 
     According to the boards' help text, the distance comes first. Some boards send the track first.
+
+    ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
     """
 
     first_m: float
     second_m: float
+    digits: tuple[float, ...] = ()
 
 
 @value(frozen=True, slots=True)

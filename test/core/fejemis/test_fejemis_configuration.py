@@ -158,6 +158,51 @@ def test_a_small_change_by_the_user_is_written() -> None:
 
 
 @pytest.mark.slow
+def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
+    """The user changes a radius by 0.3 mm, and the line that writes it is damaged on its way.
+
+    The board reports the old radius with four decimals. This is not the new one, rounded.
+    """
+    first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
+    bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
+    bench.run(2.0)
+    receive, damaged = bench.robot.receive, []
+
+    def damage(data: bytes, now: float, channel: int) -> None:
+        if b"confw" in data and not damaged:
+            damaged.append(data)
+            data = data.replace(b"confw", b"canfw")
+        receive(data, now, channel)
+
+    bench.robot.receive = damage  # type: ignore[method-assign]
+    bench.board.settings = FejemisSettings(written={Written.WHEELS: second})
+    bench.run(3.0)
+    assert damaged
+    assert bench.robot.drive.config.radii_m == (0.0772, 0.0778)
+    assert bench.board.advice is None
+
+
+@pytest.mark.parametrize(
+    ("text", "agrees"),
+    [
+        ("conf 0.0772 0.0778 19 68 0.4000 0.002", True),
+        ("conf 0.077 0.078 19.00 68 0.400 0.002", True),
+        ("conf 0.0773 0.0778 19 68 0.4000 0.002", False),
+        ("conf 0.0772 0.0778 19 68 0.5 0.002", False),
+    ],
+)
+def test_a_number_counts_as_written_if_only_the_boards_rounding_hides_it(
+    text: str, *, agrees: bool
+) -> None:
+    """The board prints more or fewer decimals than the user has set."""
+    configuration = Configuration("drive", {Written.WHEELS: (0.07724, 0.07776, 19.0, 68.0, 0.4)})
+    configuration.due(0.0, stands=True)
+    for _ in range(2):
+        configuration.hear(parse(text))
+    assert configuration.pending is not agrees
+
+
+@pytest.mark.slow
 def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() -> None:
     """The user changes a setting while the robot is driven.
 
