@@ -34,6 +34,8 @@ class DisplacementReading:
     * ``lost``: number of missing displacements before this one.
     * ``restarted``: whether the board's counters and earth frame seem to start again here.
     * ``measured``: False if the board only reports the commanded values.
+    * ``possible``: False if the robot cannot move so fast. The board's own odometry may have been
+      corrected.
     """
 
     dx_m: float
@@ -44,6 +46,7 @@ class DisplacementReading:
     lost: int
     restarted: bool = False
     measured: bool = True
+    possible: bool = True
 
 
 NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)

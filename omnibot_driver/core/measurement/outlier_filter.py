@@ -90,7 +90,7 @@ class OutlierFilter:
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. If so, an impossible but finite
-      displacement is passed on with ``measured`` False.
+      displacement is passed on with ``measured`` and ``possible`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -167,7 +167,8 @@ class OutlierFilter:
             seconds = None if before_s is None else (stamp_s - before_s) or None
         if seconds is not None and not self._possible(reading, seconds):
             if self._corrected and isfinite(reading.dx_m + reading.dy_m + reading.dyaw_rad):
-                return [(replace(reading, measured=False), stamp_s)]
+                possible = not reading.duration_s  # after a stall, many arrive at the same time
+                return [(replace(reading, measured=False, possible=possible), stamp_s)]
             self._refuse(reading)
             return []
         was_flip = leaps = False

@@ -98,7 +98,7 @@ class MotionMonitor:
         self._error = FollowingError(slack_mps, slack_radps)
         self._released = False
         self._told: set[Fault] = set()
-        self._refused = self._refused_before = 0
+        self._refused = self._refused_before = self._impossible = 0
         self.begin()
 
     def begin(self) -> None:
@@ -146,8 +146,21 @@ class MotionMonitor:
         if count < self._refused_before + REFUSED_IN_A_ROW:
             return None
         self._refused_before = count
-        driven = self._history.current is None or self._history.driven(now - LAG_S)
-        return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
+        return self._exceed(now)
+
+    def judge(self, now: float, *, possible: bool) -> Fault | None:
+        """Return the fault that four impossible displacements in a row show, or None.
+
+        Call this for each displacement that the outlier filter has passed on. A single impossible
+        one is a correction of the board's own odometry.
+        """
+        self._impossible = 0 if possible else self._impossible + 1
+        if not possible:
+            self._error.reset()
+        if self._impossible < REFUSED_IN_A_ROW:
+            return None
+        self._impossible = 0
+        return self._exceed(now)
 
     def disregard_refused(self, count: int) -> None:
         """Record how many displacements were rejected so far, and do not look for a fault.
@@ -155,6 +168,7 @@ class MotionMonitor:
         This method is called while the robot is not monitored.
         """
         self._refused = self._refused_before = count
+        self._impossible = 0
 
     def check(
         self, motion: BodyTwist, seconds: float, stamp_s: float, *, heading_known: bool
@@ -182,6 +196,16 @@ class MotionMonitor:
         if error.outside:
             return None
         return self._blocked(motion, seconds, heading_known=heading_known)
+
+    def _exceed(self, now: float) -> Fault | None:
+        """Return the fault of a robot that is faster than its physical limits.
+
+        Return None if the robot may still be slowing down after a fault.
+        """
+        history = self._history
+        if history.current is None or history.driven(now - LAG_S):
+            return self._blame(Fault.BEYOND_LIMITS, now)
+        return Fault.UNCOMMANDED if history.known(now) else None
 
     def _blame(self, fault: Fault, now: float) -> Fault:
         """Return ``fault``, and suspend the checks.

@@ -2,9 +2,12 @@
 
 """Sessions with a simulated LOIS ECU: e-stop button, advice, resets, records, and late reads."""
 
+import math
+from dataclasses import replace
+
 import pytest
 from any_board import TICK_S
-from lois_bench import FIRMWARE, Bench, configure, told
+from lois_bench import FIRMWARE, SETTINGS, Bench, configure, told
 from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
@@ -12,6 +15,7 @@ from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, Setting, Stream, e
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.requests import Request
 
 OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFFFF)
@@ -299,3 +303,23 @@ def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
     sent = b"".join(data for _, data in bench.written[begun:]).splitlines()
     led = [line[3:11] for line in sent if line.startswith(b":03")]
     assert led == [b"00000001", *[b"00000000"] * 5]
+
+
+@FIRMWARE
+@pytest.mark.slow
+def test_a_robot_that_is_faster_than_it_can_be_is_stopped(firmware: str) -> None:
+    """The robot drives at 0.8 m/s, but it is commanded 0.2 m/s and can reach 0.6 m/s at most.
+
+    All displacements are impossible. One of them may be a correction of the odometry, but not four
+    in a row, so the driver stops the robot.
+    """
+    bench = Bench(firmware)
+    bench.session.configure(replace(SETTINGS, motion=MotionLimits(fastest_mps=0.6)), bench.now)
+    bench.drive_on(0.2, 2.0)
+    turns_per_s = 0.8 / (math.tau * 0.13)
+    for motor in bench.board.motors:
+        motor.advance = lambda _duty, dt_s: turns_per_s * dt_s
+    with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot"):
+        bench.drive_on(0.2, 2.0)
+    assert bench.session.figures(bench.now).commands.trips == 1
+    assert [text for text in bench.notices if text.startswith("robot exceeds `fastest_linear")]

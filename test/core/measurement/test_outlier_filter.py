@@ -353,11 +353,12 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
     """A board's own odometry corrects itself by a step that is too large for any robot.
 
-    A filter with ``corrected=True`` releases the step, but marks it as not ``measured``. Only a
-    step that is not finite is rejected.
+    A filter with ``corrected=True`` releases the step, but marks it as neither ``measured`` nor
+    ``possible``. Only a step that is not finite is rejected.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]
     came = admitted(list(steps), through)
-    assert came == [[ahead()], [replace(ahead(1.0), measured=False)], [], [ahead(lost=1)]]
+    correction = replace(ahead(1.0), measured=False, possible=False)
+    assert came == [[ahead()], [correction], [], [ahead(lost=1)]]
     assert through.refused_displacements == 1

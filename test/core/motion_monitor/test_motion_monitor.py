@@ -295,6 +295,23 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
     assert drive.monitor.count_refused(11, drive.now) is Fault.BEYOND_LIMITS
 
 
+def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
+    """The outlier filter passes impossible displacements on, marked as such.
+
+    A possible one between them begins a new row. After the fault, the robot may roll out.
+    """
+    drive = Drive()
+    drive.command(0.1, 0.0, 0.0)
+    row = [False, True, False, False, False, True, False, False, False]
+    assert [drive.monitor.judge(drive.now, possible=each) for each in row] == [None] * 9
+    assert drive.monitor.judge(drive.now, possible=False) is Fault.BEYOND_LIMITS
+    drive.command(*REST)
+    assert [drive.monitor.judge(drive.now + 0.5, possible=False) for _ in range(8)] == [None] * 8
+    drive.now += 1.0
+    found = [drive.monitor.judge(drive.now, possible=False) for _ in range(4)]
+    assert found == [None, None, None, Fault.UNCOMMANDED]
+
+
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
     """The same fault occurs repeatedly. It is new only the first time.
 
