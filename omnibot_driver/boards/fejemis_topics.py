@@ -279,8 +279,8 @@ def _why_not_request(what: str, session: Session) -> str:
 def _why_not_off(what: str, session: Session) -> str:
     """Return why ``what``, now switched off, may still be on; empty if all ports are open."""
     why = NOT_CONNECTED if session.state == "disconnected" else session.interlocks.missing
-    later = "the driver switches it off again when all ports are open"
-    return f"{what} may still be on: {why}; {later}" if why else ""
+    later = "; the driver switches it off again when all ports are open"
+    return f"{what} may still be on: {why}{later}" if why else ""
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
