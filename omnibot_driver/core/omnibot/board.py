@@ -208,7 +208,7 @@ class OmniBot:
 
         Discard the held bytes too, because a frame in them would get the time of the next read.
         """
-        self._pieces.clear()
+        self._decode_pieces()
         self._decoder.flush(self._decoder.last_arrival_s)
         self._translation.apply(Happening.HEARD_NOTHING)
 
