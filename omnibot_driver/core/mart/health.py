@@ -148,13 +148,9 @@ class Health:
         if bits == before or bits == 0:
             self.status = bits
 
-    def outlives(self, *, certain: bool) -> None:
-        """Record that the server answers a stop only after the stop port was used.
-
-        ``certain``: False if a server that was restarted meanwhile would give the same answer.
-        """
-        if certain or not self.outlived:
-            self.outlived, self._may_be_restarted = True, not certain
+    def outlives(self) -> None:
+        """Record that the server answers a stop only after the stop port was used."""
+        self.outlived, self._may_be_restarted = True, False
 
     def restarted(self) -> None:
         """Record that the server was restarted, so that its stop port does not hang."""

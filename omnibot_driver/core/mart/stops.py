@@ -285,16 +285,12 @@ class Stops(Ground, ABC):
 
         In this state, the server's stop port could hang the next forward drive (RM); see
         docs/boards/mart.md. A reply with a number does not show this state. It answers an earlier
-        query, or the stop of a turn on the spot, which leaves the stop port free. If the ``ok`` is
-        lost, the repeated stops find no motion; a restarted server gives the same answer.
+        query, or the stop of a turn on the spot, which leaves the stop port free.
         """
-        if isinstance(reply, Ok) and self.motion is not Motion.SPIN:
-            if reply.form is Form.NOTHING and reply.form in ANSWERS.get(self.motion, ()):
-                self.health.outlives(certain=True)
+        if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return
-        none = isinstance(reply, Fail) and reply.reason in (words.NO_MOTION, words.NOT_IN_MOTION)
-        if none and self.motion in (Motion.REFERENCE, Motion.REVERSE):
-            self.health.outlives(certain=False)
+        if reply.form is Form.NOTHING and reply.form in ANSWERS.get(self.motion, ()):
+            self.health.outlives()
 
     def _repeat_lost(self, now: float) -> Packets:
         if now < self._said_lost_s + LOST_REPEAT_S:
