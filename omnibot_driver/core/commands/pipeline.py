@@ -199,10 +199,8 @@ class CommandPipeline:
 
         The motion comes from the newest estimate, or from ``reading`` if the estimate has none.
         """
-        if fault := self._monitor.judge(now, possible=reading.possible):
-            return fault
         if not reading.possible:
-            return None
+            return self._monitor.count_impossible(now)
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
             self._monitor.begin()

@@ -98,13 +98,14 @@ class MotionMonitor:
         self._error = FollowingError(slack_mps, slack_radps)
         self._released = False
         self._told: set[Fault] = set()
-        self._refused = self._refused_before = self._impossible = 0
+        self._refused = self._refused_before = 0
         self.begin()
 
     def begin(self) -> None:
         """Forget earlier commands and measurements."""
         self._history.clear()
         self._error.reset()
+        self._impossible = 0
         self._has_stood = False
         self._stood_s = self._moved_s = self._blocked_s = self._stop_again_s = 0.0
 
@@ -148,15 +149,14 @@ class MotionMonitor:
         self._refused_before = count
         return self._exceed(now)
 
-    def judge(self, now: float, *, possible: bool) -> Fault | None:
+    def count_impossible(self, now: float) -> Fault | None:
         """Return the fault that four impossible displacements in a row show, or None.
 
-        Call this for each displacement that the outlier filter has passed on. A single impossible
-        one is a correction of the board's own odometry.
+        Call this instead of ``check`` for an impossible displacement that the outlier filter has
+        passed on. A single one is a correction of the board's own odometry.
         """
-        self._impossible = 0 if possible else self._impossible + 1
-        if not possible:
-            self._error.reset()
+        self._error.reset()
+        self._impossible += 1
         if self._impossible < REFUSED_IN_A_ROW:
             return None
         self._impossible = 0
@@ -180,6 +180,7 @@ class MotionMonitor:
         ``heading_known``: if False, the direction of the linear velocity is not checked.
         """
         self._refused_before = self._refused
+        self._impossible = 0
         begun_s, current = stamp_s - seconds, self._history.current
         if current is None or not self._history.known(begun_s):
             self._error.reset()

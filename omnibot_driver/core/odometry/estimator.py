@@ -173,7 +173,7 @@ class Odometry:
         if self._board is None or self._restarted is not None:
             self._belief.doubted = told
             return []
-        lost_s = reading.lost * self._bridge.period_s
+        lost_s = reading.lost * self._bridge.last[1] if self._bridge.last else 0.0
         is_long = bool(self._backlog) or lost_s > LONG_GAP_S
         if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
             return self._resume(told, lost_s)

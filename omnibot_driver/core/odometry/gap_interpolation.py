@@ -29,11 +29,6 @@ class GapInterpolation:
     def __init__(self) -> None:
         self.last: tuple[Pose, float] | None = None
 
-    @property
-    def period_s(self) -> float:
-        """Duration of the newest displacement in s; 0 if unknown."""
-        return self.last[1] if self.last else 0.0
-
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:

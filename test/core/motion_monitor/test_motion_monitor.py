@@ -302,13 +302,15 @@ def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correct
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)
-    row = [False, True, False, False, False, True, False, False, False]
-    assert [drive.monitor.judge(drive.now, possible=each) for each in row] == [None] * 9
-    assert drive.monitor.judge(drive.now, possible=False) is Fault.BEYOND_LIMITS
+    assert drive.monitor.count_impossible(drive.now) is None
+    for _ in range(2):
+        drive.move((0.1, 0.0, 0.0), PERIOD_S)
+        assert [drive.monitor.count_impossible(drive.now) for _ in range(3)] == [None] * 3
+    assert drive.monitor.count_impossible(drive.now) is Fault.BEYOND_LIMITS
     drive.command(*REST)
-    assert [drive.monitor.judge(drive.now + 0.5, possible=False) for _ in range(8)] == [None] * 8
+    assert [drive.monitor.count_impossible(drive.now + 0.5) for _ in range(8)] == [None] * 8
     drive.now += 1.0
-    found = [drive.monitor.judge(drive.now, possible=False) for _ in range(4)]
+    found = [drive.monitor.count_impossible(drive.now) for _ in range(4)]
     assert found == [None, None, None, Fault.UNCOMMANDED]
 
 
