@@ -6,7 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from calibrate_rig import rig, row
+from calibrate_rig import ATTEMPTS, rig, row
 
 from omnibot_driver import calibration
 from omnibot_driver.boards.omnibot import PARAMETERS
@@ -17,6 +17,7 @@ from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.needs import ToolError
 
 USUAL = MotorConstants()
+UNSTEADY = "responds differently from step to step"
 SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ticks=1)
 
 
@@ -25,12 +26,16 @@ def test_a_planted_motor_is_found(
 ) -> None:
     """Wheel B has another motor. ``calibrate step`` finds the motor's constants within 5 %.
 
-    The tolerance allows for a busy test machine.
+    On a busy computer, commands arrive late, and the tool warns that the steps differ. Then the
+    test begins the calibration again, as the warning advises.
     """
     monkeypatch.setattr(step, "RUN_UP_S", 1.0)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
-        code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
-    table = capsys.readouterr().out
+        for _ in range(ATTEMPTS):
+            code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
+            table = capsys.readouterr().out
+            if UNSTEADY not in table:
+                break
     assert code == 0, table
     for name, planted, tolerance in (
         ("B: gain", 1.0, 0.05),
@@ -39,7 +44,7 @@ def test_a_planted_motor_is_found(
         ("B: overshoot", 0.25, 0.08),  # calculated for this loop, with the delay below
     ):
         found, sigma = row(table, name)
-        assert found == pytest.approx(planted, abs=tolerance), name
+        assert found == pytest.approx(planted, abs=tolerance), f"{name} in:\n{table}"
         assert 0 < sigma < tolerance
     delay_s, sigma = row(table, "B: motor delay")
     assert 0.0 < delay_s < 0.035  # planted: 0.01 s; a busy host errs by a tick in a command's time
