@@ -95,3 +95,19 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     assert not sender.is_obeyed(drive, (1,))
     bench.run(0.5)
     assert sender.is_obeyed(drive, (1,))
+
+
+def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The motion monitor has stopped the robot, and no command came for ``cmd_vel_timeout``.
+
+    Then a sender begins with a late command. Its next command is obeyed.
+    """
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    sender = Sender(bench, monkeypatch)
+    bench.run(0.6)
+    assert bench.session.figures(bench.now).commands.interlock == ""
+    assert not sender.is_obeyed(REFUSED["a long time in transit"])
+    assert sender.is_obeyed(drive)

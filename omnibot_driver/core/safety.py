@@ -162,7 +162,8 @@ class SafetyStops:
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()
         self._policy.halt(now)
-        self._commanding.interlock.be_active(now)
+        timeout_s = self._policy.settings.timeout_s
+        self._commanding.interlock.be_active(now, timeout_s, stalled_s=seconds)
         self._reporter.notify(
             [f"driver stalled for {seconds:.1f} s; robot stopped until the next command"]
         )

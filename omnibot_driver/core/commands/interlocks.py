@@ -48,7 +48,7 @@ class Interlocks:
         makes this wait begin again. Call this for every refused command, also if another check has
         refused it.
         """
-        self._interlock.be_active(now)
+        self._interlock.be_active(now, self._policy.settings.timeout_s)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.

@@ -63,13 +63,20 @@ class MotionInterlock:
         if self.until is Until.ESTOP:
             self.start()
 
-    def be_active(self, now: float) -> None:
+    def expire(self, now: float, timeout_s: float) -> None:
+        """End the refusal after a first stop if no command has arrived for ``timeout_s``."""
+        if self.until is Until.RELEASE and not self.reason(now, timeout_s):
+            self.until = Until.NOTHING
+
+    def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
         """Record that a sender of commands was active at ``now``.
 
-        After a first stop, the refusal ends when no command has arrived for ``timeout_s``
-        (``arrive``). This time begins again here. Call this when a command is refused, and after a
-        stall of this process.
+        A wait for ``timeout_s`` without commands begins again here, unless it is over (``expire``).
+        Call this when a command is refused, and after a stall of this process.
+
+        ``stalled_s``: length of this stall. It does not count as time without commands.
         """
+        self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:

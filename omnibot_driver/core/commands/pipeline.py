@@ -90,6 +90,7 @@ class CommandPipeline:
         stricter = commands.timeout_s < self.policy.settings.timeout_s or limits.stricter_than(
             self.shaper.limits
         )
+        self.interlock.expire(now, self.policy.settings.timeout_s)
         self.shaper.limits, self.shaper.kinematics = limits, settings.kinematics
         self.policy.configure(commands)
         current = self.policy.current

@@ -2,6 +2,8 @@
 
 """Tests of when a robot may move again after the motion monitor has stopped it."""
 
+from dataclasses import replace
+
 import pytest
 from disobedient_robots import (
     SLOWLY,
@@ -138,6 +140,33 @@ def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
     bench.run(0.3)
     assert try_to_drive(bench, 2.0) == 0
     bench.run(0.6)
+    assert try_to_drive(bench, 0.1) == 1
+
+
+def test_a_stall_of_the_driver_does_not_bring_back_a_refusal_that_has_ended() -> None:
+    """The motion monitor has stopped the robot, and no command came for ``cmd_vel_timeout``.
+
+    Then the driver stalls. The next command is obeyed.
+    """
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    bench.run(0.6)
+    bench.now += 3.0
+    bench.session.stood_still(3.0, bench.now)
+    assert bench.session.figures(bench.now).commands.interlock == ""
+    assert try_to_drive(bench, 0.1) == 1
+
+
+def test_a_longer_timeout_does_not_bring_back_a_refusal_that_has_ended() -> None:
+    """The motion monitor has stopped the robot, and no command came for ``cmd_vel_timeout``.
+
+    Then the user sets a longer timeout. The next command is obeyed.
+    """
+    bench = on_the_wrong_switch("earth")
+    stopped_after_s(bench, SLOWLY)
+    bench.run(0.6)
+    bench.configure(commands=replace(bench.settings.commands, timeout_s=10.0))
+    assert bench.session.figures(bench.now).commands.interlock == ""
     assert try_to_drive(bench, 0.1) == 1
 
 
