@@ -25,6 +25,7 @@ from omnibot_driver.core.events import Event, Extra, Notice, StateChanged
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.core.packets import Packet
+from omnibot_driver.core.readings import Unstamped
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.traits import Traits
@@ -160,8 +161,8 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock.
 
-        While this clock is 0 or outside the range of ROS time, measurements are not published, but
-        requests are answered. The clock may also jump back.
+        While this clock is 0 or outside the range of ROS time, only events without a stamp, such as
+        answers to requests, are published. The clock may also jump back.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -170,8 +171,9 @@ class Publishing:
         offset_ns = now_ns - time.monotonic_ns()
         for event in events:
             kind = type(event)
-            answers = isinstance(event, Extra) and isinstance(event.value, RequestDone)
-            if answers or not isinstance(event, ImuEstimate | OdometryEstimate | Extra):
+            extra = event.value if isinstance(event, Extra) else None
+            stamped = isinstance(event, ImuEstimate | OdometryEstimate | Extra)
+            if not stamped or isinstance(extra, RequestDone | Unstamped):
                 self._handlers[kind](event, offset_ns)
             elif 0 < now_ns < LATEST_NS:
                 steady_ns = round(event.stamp_s * 1e9)

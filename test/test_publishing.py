@@ -25,6 +25,10 @@ from omnibot_driver.core.events import Extra
 from omnibot_driver.core.fejemis import JobDone as FejemisDone
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
+from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine
+from omnibot_driver.core.lois_ecu.messages import Record
+from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading, TerminalLeft
+from omnibot_driver.core.mart.readings import DockedReading
 from omnibot_driver.core.mart.readings import JobDone as MartDone
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
@@ -32,6 +36,7 @@ from omnibot_driver.core.omnibot import PausedFrame
 from omnibot_driver.core.omnibot.board import TRAITS
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.omnibot.modes import ModeTracker
+from omnibot_driver.core.readings import EStopButtonReading
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings
 from omnibot_driver.publishing import Publishing
@@ -194,6 +199,32 @@ def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) ->
         publishing.deliver([Extra(Charge(12.5), 2.0), Extra(kind(token, True, "done"), 2.0)])
         assert token.done()
     assert not published
+    publishing._time_watch.unregister()  # otherwise rcl calls the destroyed watch
+
+
+WITHOUT_STAMP = (
+    RecordReading(Record(RecordKind.RPM, (), ()), None, 60),
+    RecordFailed("the board did not answer"),
+    EStopButtonReading(True),
+    TerminalLine("$HCHDT"),
+    TerminalLeft(),
+    DockedReading(True),
+)
+
+
+@pytest.mark.parametrize("value", WITHOUT_STAMP, ids=lambda value: type(value).__name__)
+def test_what_needs_no_stamp_does_not_wait_for_simulated_time(node: Node, value: object) -> None:
+    """The simulated clock has not begun. The board's records and changes of state are passed on.
+
+    Otherwise, ~/record_rpm would answer only after 120 s, and a press of the e-stop button, which
+    the board reports once, would never be published.
+    """
+    node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
+    _, publishing = session_with(node)
+    published: list[object] = []
+    publishing.extras = {type(value): lambda value, _ns: published.append(value)}
+    publishing.deliver([Extra(value, 2.0)])
+    assert published == [value]
     publishing._time_watch.unregister()  # otherwise rcl calls the destroyed watch
 
 

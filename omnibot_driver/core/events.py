@@ -28,7 +28,7 @@ class Notice:
 class Extra:
     """A measurement that only one kind of board makes; its profile publishes it.
 
-    The result of a request is passed on in the same way if ``value`` is a RequestDone.
+    If ``value`` is a RequestDone or Unstamped, it needs no stamp.
 
     * ``stamp_s``: time of measurement, in s of the host's steady clock.
     """

@@ -13,6 +13,14 @@ from omnibot_driver.core.values import value
 Vector3 = tuple[float, float, float]
 
 
+@dataclass(frozen=True, slots=True)
+class Unstamped:
+    """A reading whose ROS message has no stamp, such as a state or the result of a request.
+
+    It is also published while simulated time has not begun.
+    """
+
+
 @value(frozen=True, slots=True)
 class ImuReading:
     """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
@@ -103,7 +111,7 @@ class OdometryReading:
 
 
 @dataclass(frozen=True, slots=True)
-class EStopButtonReading:
+class EStopButtonReading(Unstamped):
     """The emergency stop button on the robot was pressed or released."""
 
     pressed: bool

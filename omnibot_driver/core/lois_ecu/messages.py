@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import Final
 
+from omnibot_driver.core.readings import Unstamped
+
 PERIOD_ONCE: Final = 0xFFFE
 """Value that is sent instead of a period in ms, so that the board sends the message only once."""
 PERIOD_OFF: Final = 0xFFFF
@@ -316,7 +318,7 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
-class TerminalLine:
+class TerminalLine(Unstamped):
     """A line of text from a sensor, which the board passes on in a terminal mode."""
 
     text: str

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from omnibot_driver.core.lois_ecu.messages import EStopButton, Record, TerminalLine
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
-from omnibot_driver.core.readings import DisplacementReading
+from omnibot_driver.core.readings import DisplacementReading, Unstamped
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class HeadingReading:
 
 
 @dataclass(frozen=True, slots=True)
-class RecordReading:
+class RecordReading(Unstamped):
     """A record that was requested.
 
     ``count_s``: time unit of an RPM record in s, None while unknown.
@@ -60,7 +60,7 @@ class RecordComes:
 
 
 @dataclass(frozen=True, slots=True)
-class RecordFailed:
+class RecordFailed(Unstamped):
     """Notification that a requested record will not come.
 
     ``reason``: the cause, and what to do.
@@ -70,7 +70,7 @@ class RecordFailed:
 
 
 @dataclass(frozen=True, slots=True)
-class TerminalLeft:
+class TerminalLeft(Unstamped):
     """Notification that a terminal mode has ended.
 
     The e-stop button may have changed meanwhile. In a terminal mode, its state is not reported.

@@ -5,6 +5,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from omnibot_driver.core.readings import Unstamped
 from omnibot_driver.core.requests import RequestDone
 
 Side = Literal["front", "rear"]
@@ -29,7 +30,7 @@ class SonarReading:
 
 
 @dataclass(frozen=True, slots=True)
-class DockedReading:
+class DockedReading(Unstamped):
     """Whether the robot is at its dock."""
 
     docked: bool
