@@ -161,14 +161,16 @@ class LoisEcuTopics:
     def _say(
         self, action: Callable[[LoisEcuBoard, float], None], message: str, response: Any
     ) -> Any:
-        def say(session: Session, now: float) -> bool:
+        def say(session: Session, now: float) -> str:
+            if why := session.interlocks.why_not_request():
+                return why
             if not session.board.mode.running or session.state == "disconnected":
-                return False
+                return NOT_HEARD
             action(cast(LoisEcuBoard, session.board), now)
-            return True
+            return ""
 
-        response.success = self._link.call(say)
-        response.message = message if response.success else NOT_HEARD
+        refused = self._link.call(say)
+        response.success, response.message = not refused, refused or message
         return response
 
     def _expires_s(self) -> float:

@@ -146,6 +146,8 @@ class MartTopics:
 
         def ask(session: Session, now: float) -> str:
             board = cast(MartBoard, session.board)
+            if why := session.interlocks.why_not_request():
+                return str(why)
             if session.state != "nominal":
                 return NO_DATA
             if session.estop_active:
