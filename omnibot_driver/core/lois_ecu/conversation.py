@@ -129,6 +129,8 @@ class LoisConversation:
             if isinstance(report, Ticks | BoardOdometry):
                 self._stall.heard(report, at, self._translation.odometry.resting)
         stalled = self._stall.stalled(now)
+        if any(stalled):
+            self._upkeep.writer.repeat(now)
         if self._translation.odometry.appends and any(stalled):
             rolls_left, rolls_right = self._stall.may_roll
             self._translation.odometry.stalled(

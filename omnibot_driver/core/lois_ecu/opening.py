@@ -125,6 +125,14 @@ class SettingsWriter:
         self._rounds = 0
         self._in_period = self._answered = False
 
+    def repeat(self, now: float) -> None:
+        """Write all settings again, at the latest when the robot is at rest.
+
+        Called if a wheel does not start, because all lines of its low-pass may have been lost.
+        """
+        if self.done:
+            self._rounds_left, self._round_at_s = ROUNDS, now
+
     def write(self, command: Command, now: float) -> None:
         """Queue a command that is not a setting, to be sent ``ROUNDS`` times.
 
@@ -196,23 +204,25 @@ class SettingsWriter:
         """Return the commands of a round. Each round begins with a different command.
 
         A board that sends a report once a round could otherwise miss the same line in each round.
+        The request for a date comes last. The board answers at once, and so would miss a setting
+        that follows directly, as it does if a busy computer writes the lines of a round together.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order
         rest = found[first:]
         place = rounds * len(rest) // ROUNDS % len(rest)
-        return [*found[:first], *rest[place:], *rest[:place]]
+        # The board sends no dates after a boot. So each round requests one date.
+        periodic = self._answered and self._dates_come_periodically
+        asked = [] if periodic else [SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)]
+        return [*found[:first], *rest[place:], *rest[:place], *asked]
 
     def commands(self) -> Iterable[Command]:
-        """Yield the commands in the order in which they are written."""
+        """Yield the commands that write settings, in the order of the first round."""
         settings = self.settings
         if not settings.with_sum:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
         if self.overwritten or not settings.with_sum:
             yield self._left_short_correction()
-        # The board sends no dates after a boot. So each round requests one date.
-        if not (self._answered and self._dates_come_periodically):
-            yield SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
         for stream, period_ms in settings.periods_ms.items():
             yield SetPeriod(stream, period_ms)

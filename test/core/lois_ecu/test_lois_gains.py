@@ -1,16 +1,19 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The notice about controller gains that the user has not set, so that the board uses its own."""
+"""Controller gains: how they reach the board, and the notice about those that are not set."""
 
 from dataclasses import replace
 
 import pytest
 from any_board import AnyBench, LoisRobot
+from lois_bench import Bench
 from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.lois_ecu import Setting
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
+from omnibot_driver.core.lois_ecu.opening import ROUNDS, SettingsWriter
+from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
@@ -52,3 +55,37 @@ def test_gains_that_are_set_need_no_words() -> None:
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
     """Duty commands bypass the speed controllers. The notice does not appear."""
     assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []
+
+
+@pytest.mark.slow
+def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
+    """The lines of each round arrive without a pause between them.
+
+    The board sends the requested date at once, and loses what arrives meanwhile. Every setting
+    still reaches the board.
+    """
+    writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
+    writer.begin(0.0)
+    for count in range(ROUNDS):
+        robot.board.receive(writer.due(float(count)) + writer.due(count + 0.9))
+        for _ in range(100):
+            robot.advance()
+    left, right = (wheel.controller.gains for wheel in robot.board.wheels)
+    assert left.low_pass == right.low_pass == pytest.approx(HOST_GAINS.low_pass)
+    assert left.kp == pytest.approx(HOST_GAINS.written[Setting.LEFT_KP])
+    assert right.td == pytest.approx(HOST_GAINS.written[Setting.RIGHT_TD])
+
+
+@pytest.mark.slow
+def test_a_wheel_that_does_not_start_gets_its_settings_again_at_rest() -> None:
+    """The board lost the low-pass, so the wheels do not turn. The next drive moves the robot."""
+    bench = Bench("firmware", HOST_GAINS)
+    for wheel in bench.board.wheels:
+        wheel.controller.change(low_pass=0.0)
+    before = len(bench.written)
+    bench.drive_on(0.3, 4.0)
+    assert bench.board.standing
+    assert not any(data.startswith(b":23") for _, data in bench.written[before:])
+    bench.run(3.0)
+    bench.drive_on(0.3, 3.0)
+    assert not bench.board.standing
