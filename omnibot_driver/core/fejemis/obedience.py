@@ -32,13 +32,13 @@ class Obedience:
 
     def __init__(self) -> None:
         self.estopped = False
+        self.pause_said = False
         self._resume = False
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection. A latched e-stop stays latched."""
+        """Begin a new connection. A latched e-stop and a requested pause stay in force."""
         self.source: float | None = None
-        self.pause_said = False
         self._released_at = -math.inf
         self.start_at = math.inf
         """Time in s at which to send ``start``; infinity if there is no reason to send it."""

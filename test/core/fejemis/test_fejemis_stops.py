@@ -102,6 +102,27 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
     assert not bench.robot.standing
 
 
+def test_a_pause_survives_a_reconnect_and_the_release_of_an_estop() -> None:
+    """The e-stop is latched, the user pauses the robot, and the port of the front board is lost.
+
+    At the release of the e-stop, the driver does not send ``start``: the pause ends only with
+    ~/start.
+    """
+    bench = nominal()
+    bench.estop(True)
+    bench.run(0.5)
+    assert bench.ask(Request.PAUSE).success
+    bench.close()
+    bench.speaks = bench.hears = {DRIVE}
+    bench.open(missing="the port 'front' is missing")
+    bench.run(1.0)
+    mark = bench.now
+    bench.estop(False)
+    bench.run(1.0)
+    assert "start" not in bench.lines(DRIVE, mark)
+    assert bench.robot.drive.source == -1
+
+
 def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
     """The board is stopped when the driver connects.
 
