@@ -79,6 +79,7 @@ class Half:
         """Begin a new connection. The half keeps its role until a heartbeat shows another one."""
         self.decoder = FejemisDecoder(line_sums)
         self.decoder.statistics = self.statistics
+        self.clock.connect()
         self.unknown_words.clear()
         self.heartbeat: Heartbeat | None = None
         self.heard_at = -math.inf

@@ -63,6 +63,13 @@ class TeensyClock:
         self._earlies: list[tuple[float, float]] = []
         """Times that seem early, but are otherwise plausible, each with its arrival."""
         self._last_s = 0.0
+        self.connect()
+
+    def connect(self) -> None:
+        """Begin a new connection: none of its lines has waited for the end of an earlier stall.
+
+        The times of the board are kept.
+        """
         self._stalled, self._waited_until = False, -math.inf
 
     def stalled(self) -> None:

@@ -138,6 +138,33 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 
 
 @pytest.mark.slow
+def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
+    """The drive board restarts while only its port is away, and the computer stalls meanwhile.
+
+    No line of the new connection has waited for the end of the stall. So a line that seems late
+    shows the restart, and the odometry does not jump.
+    """
+    bench = nominal()
+    bench.drive_on(0.3, 0.0, 3.0)
+    bench.run(1.5)
+    before = bench.odometry[-1].pose
+    bench.close()
+    bench.speaks = bench.hears = {FRONT}
+    bench.open(missing="the port 'drive' is missing")
+    bench.robot.drive.reboot()
+    bench.run(4.0)
+    bench.session.stood_still(0.5, bench.now)
+    bench.run(4.0)
+    bench.close()
+    bench.speaks = bench.hears = {DRIVE, FRONT}
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    assert before.way_to(bench.odometry[-1].pose).way_m < 0.02
+    assert any("drive board has restarted" in text for text in bench.notices)
+
+
+@pytest.mark.slow
 def test_a_port_that_was_away_for_long_is_no_restart() -> None:
     """The port is away for longer than the boards had run before. The boards have not restarted."""
     bench = nominal()
