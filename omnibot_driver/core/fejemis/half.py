@@ -61,11 +61,15 @@ class Half:
     ``restarted``: whether the board has restarted. The caller resets this flag.
 
     ``heard_at``: time in s of the last valid line.
+
+    ``clocks``: the clocks of the earlier connections, by identity. A half takes the clock of its
+    board from here, because the board may have been at the other port before.
     """
 
-    def __init__(self, line_sums: LineSums) -> None:
+    def __init__(self, line_sums: LineSums, clocks: dict[int, TeensyClock]) -> None:
         self.statistics = DecoderStatistics()
         self.clock = TeensyClock()
+        self._clocks = clocks
         self.unknown_words: dict[str, None] = {}
         """Lines from the driver that the firmware does not know, from the oldest to the newest."""
         self.rejected = 0
@@ -80,6 +84,10 @@ class Half:
         self.decoder = FejemisDecoder(line_sums)
         self.decoder.statistics = self.statistics
         self.clock.connect()
+        if self.role is not None and self.identity is not None:
+            self._clocks[self.identity] = self.clock
+        self._clock_of: int | None = None
+        """Identity for which ``clock`` was taken; None before the first heartbeat."""
         self.unknown_words.clear()
         self.heartbeat: Heartbeat | None = None
         self.heard_at = -math.inf
@@ -221,10 +229,11 @@ class Half:
         """Accept the first identity at once; another one must be in two heartbeats in a row."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
-            if identity != self.identity:
+            if identity != self._clock_of:
+                self._clock_of = identity
                 self._next_at = -math.inf
                 self.unknown_words.clear()
-                self.clock.begin()
+                self.clock = self._clocks.pop(identity, TeensyClock())
             self.identity, self.role = identity, ROLES.get(identity)
         if self.heartbeat is None:
             self._next_at = -math.inf

@@ -15,6 +15,7 @@ from typing import Final
 from omnibot_driver.core.fejemis import outbound
 from omnibot_driver.core.fejemis.half import Half, Role
 from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.teensy_clock import TeensyClock
 from omnibot_driver.core.fejemis.traits import TRAITS
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.traits import Traits
@@ -32,7 +33,8 @@ class Ports:
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
-        self.halves = Half(settings.line_sums), Half(settings.line_sums)
+        clocks: dict[int, TeensyClock] = {}
+        self.halves = Half(settings.line_sums, clocks), Half(settings.line_sums, clocks)
         self.swapped = self._known_swapped = False
 
     @property

@@ -139,6 +139,26 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
 
 
 @pytest.mark.slow
+def test_boards_that_only_change_their_ports_have_not_restarted() -> None:
+    """Both cables are unplugged, and plugged in again in the other order.
+
+    The driver reports no restart, and ``odom`` continues.
+    """
+    bench = nominal()
+    bench.drive_on()
+    bench.close()
+    bench.robot._at_port = bench.robot._at_port[::-1]
+    bench.run(2.0)
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(0.5)
+    assert any("the ports are swapped" in text for text in bench.notices)
+    assert not any("restarted" in text for text in bench.notices)
+    odom, truth = bench.odometry[-1].pose, bench.robot.truth
+    assert (odom.x_m, odom.y_m) == pytest.approx((truth.x_m, truth.y_m), abs=0.002)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ids", "sentence"),
     [

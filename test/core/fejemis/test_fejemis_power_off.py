@@ -131,6 +131,31 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 
 
 @pytest.mark.slow
+def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_other_order(
+    bench: Bench,
+) -> None:
+    """Both boards restart while not connected, and come back at each other's port.
+
+    The driver compares the time of each board with that of the same board before, whichever port it
+    is at. So it notices both restarts, and accepts motion.
+    """
+    bench.close()
+    bench.speaks = set()
+    bench.robot.drive.reboot()
+    bench.robot.front.reboot()
+    bench.robot._at_port = bench.robot._at_port[::-1]
+    bench.run(1.0)
+    bench.speaks = {DRIVE, FRONT}
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(0.5)
+    for half in ("drive", "front"):
+        assert any(f"the {half} board has restarted" in text for text in bench.notices)
+    bench.drive_on(seconds=0.3)
+    assert not bench.robot.standing
+
+
+@pytest.mark.slow
 def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
     """The front board restarts after a request to power off. Only the drive board cuts the power.
 
