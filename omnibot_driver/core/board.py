@@ -141,6 +141,11 @@ class Board(Protocol):
         """Reason why a requested reset is refused, with a remedy; empty if a reset is allowed."""
         return ""
 
+    @property
+    def start_refusal(self) -> str:
+        """Reason why ``start`` cannot start a paused board now, with a remedy; empty if it can."""
+        return ""
+
     def gravity_advice(self, gravity_mps2: float) -> str:
         """Return advice on the IMU's settings if the measured gravity is wrong; otherwise empty.
 
@@ -214,13 +219,12 @@ class Board(Protocol):
         These packets must work in any state of the board.
         """
 
-    def start_requested(self) -> str:
-        """Record that the user has requested a start. The driver calls ``start`` next.
+    def start_requested(self) -> None:
+        """Record that the user has requested a start. If it can start, ``start`` follows.
 
-        Return why ``start`` cannot start a paused board now, with a remedy; empty if it can. Not
-        called for the driver's own starts, e.g. after a reconnect.
+        Not called for the driver's own starts, e.g. after a reconnect.
         """
-        return ""
+        return
 
     def start(self) -> Packets:
         """Return the packets that start the board from any mode. They may be sent repeatedly."""

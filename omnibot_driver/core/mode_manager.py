@@ -78,7 +78,8 @@ class ModeManager:
         self.phase = Phase.CLOSED
         self.answers: list[RequestDone] = []
         self._board = board
-        self._wanted = Wanted.RUNNING if run else Wanted.ANY
+        self._wanted = self._wanted_before = Wanted.RUNNING if run else Wanted.ANY
+        """``_wanted_before``: the wanted mode before the last request."""
         self.output: Packets = NO_PACKETS
         """Packets to write before any others; see ``take_output``."""
         self._said_at = self._data_at = -math.inf
@@ -138,13 +139,13 @@ class ModeManager:
             raise RequestRefused(f"reset refused: {reason}")
         self._request, self._token = request, token
         self._deadline = now + ANSWER_WITHIN_S
+        self._wanted_before = self._wanted
         if request is Request.START:
-            why_not, running = self._board.start_requested(), self._board.mode.running
-            if why_not and not running:
-                self._answer(False, why_not)
+            self._board.start_requested()
+            if self.give_up_start():
                 return
             self._wanted = Wanted.RUNNING
-            if running:
+            if self._board.mode.running:
                 self.phase = Phase.SETTLED
                 self._say(self._board.start(), now)
             else:
@@ -159,6 +160,20 @@ class ModeManager:
             self.phase = Phase.RESETTING
             self._deadline = now + RESET_WITHIN_S
             self._say(self._board.reset(), now)
+
+    def give_up_start(self) -> bool:
+        """Return whether a ~/start is open that the board refuses. If so, fail it.
+
+        The mode from before this ~/start is wanted again.
+        """
+        refusal = self._board.start_refusal
+        if self._request is not Request.START or self._board.mode.running or not refusal:
+            return False
+        self._wanted = self._wanted_before
+        if self.phase is Phase.STARTING and self._wanted is not Wanted.RUNNING:
+            self.phase = Phase.SETTLED
+        self._answer(False, refusal)
+        return True
 
     def heard_paused(self, now: float, *, continues: bool) -> None:
         """Record that the board is paused.

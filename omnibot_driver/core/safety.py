@@ -103,6 +103,7 @@ class SafetyStops:
             if not latched:
                 self._reporter.notify([f"e-stop latched by {by}"])
             self._policy.latch(now)
+            self._mode_manager.give_up_start()
             self._task.give_up("the e-stop was latched during the request")
             if not latched:
                 self._measurement.inertial.calibration.give_up(

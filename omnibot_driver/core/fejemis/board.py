@@ -115,6 +115,13 @@ class FejemisBoard(Board):
         return watch.refusal or self._upkeep.pending or follower.refusal
 
     @property
+    def start_refusal(self) -> str:
+        """The reason why the drive board cannot be started now: the e-stop; otherwise empty."""
+        if self._obedience.estopped:
+            return "the e-stop is latched; release it with ~/estop (data: false), then call again"
+        return ""
+
+    @property
     def advice(self) -> str | None:
         """Advice on what the user should check; None if nothing is wrong."""
         return self._upkeep.advice
@@ -267,17 +274,13 @@ class FejemisBoard(Board):
         """Return a Stop for both boards, and the lines that switch lift and brush off."""
         return self.stop() + self._all_off()
 
-    def start_requested(self) -> str:
+    def start_requested(self) -> None:
         """Forget that the front wheel did not reach its angle, and cancel a requested power-off.
 
-        This happens whenever the user calls ~/start, even during an e-stop. Then, return why the
-        board cannot be started.
+        This happens whenever the user calls ~/start, even during an e-stop.
         """
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()
-        if self._obedience.estopped:
-            return "the e-stop is latched; release it with ~/estop (data: false), then call again"
-        return ""
 
     def start(self) -> Packets:
         """Return a Stop and then ``start``; return no packets during an e-stop.

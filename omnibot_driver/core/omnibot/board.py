@@ -83,7 +83,7 @@ class OmniBot:
     clock = None
     wake_at = math.inf
     shows_standstill = True
-    refusal = reset_refusal = ""
+    refusal = reset_refusal = start_refusal = ""
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)
@@ -237,9 +237,8 @@ class OmniBot:
         """Return Stop; the zero bytes before it wake the board."""
         return packed(STOP)
 
-    def start_requested(self) -> str:
+    def start_requested(self) -> None:
         """Do nothing: ``start`` is the same, whether the user or the driver requests the start."""
-        return ""
 
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""

@@ -7,7 +7,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.requests import Request
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware
 
@@ -167,6 +167,30 @@ def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() 
     assert not answer.success
     assert "release it with ~/estop" in answer.message
     assert bench.now - mark < 0.1
+    bench.estop(False)
+    bench.run(2.0)
+    assert "start" not in bench.lines(DRIVE, mark)
+    assert bench.session.state == "paused"
+    assert bench.ask(Request.START).success
+
+
+def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None:
+    """The robot is paused. The e-stop is latched before the drive board has confirmed ~/start.
+
+    The answer names the e-stop. The robot stays paused after the release, until the next ~/start.
+    """
+    bench = nominal()
+    assert bench.ask(Request.PAUSE).success
+    token = object()
+    bench.session.request(Request.START, token, bench.now)
+    bench.settle()
+    bench.run(0.02)
+    bench.estop(True)
+    bench.run(0.1)
+    (answer,) = (e for e in bench.events if isinstance(e, RequestDone) and e.token is token)
+    assert not answer.success
+    assert "release it with ~/estop" in answer.message
+    mark = bench.now
     bench.estop(False)
     bench.run(2.0)
     assert "start" not in bench.lines(DRIVE, mark)
