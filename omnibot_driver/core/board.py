@@ -191,7 +191,8 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        OdometryReadings and NoticeReadings in the result do not show that the board is alive.
+        OdometryReadings, NoticeReadings and results of requests in the returned list do not show
+        that the board is alive.
         """
         return []
 

@@ -6,14 +6,23 @@ This module knows the board, the measurements and the safety stops; it does not 
 mean, or what is commanded.
 """
 
+from collections.abc import Sequence
+
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.measurement.pipeline import MeasurementPipeline
 from omnibot_driver.core.mode_manager import ModeManager
-from omnibot_driver.core.readings import NoticeReading, OdometryReading, PausedReading, Reading
+from omnibot_driver.core.readings import (
+    ExtraReading,
+    NoticeReading,
+    OdometryReading,
+    PausedReading,
+    Reading,
+)
 from omnibot_driver.core.reporter import Reporter
+from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.safety import SafetyStops
 
 
@@ -92,25 +101,35 @@ class Inbound:
         return True
 
     def elapse(self, now: float) -> None:
-        """Process readings that follow from time alone, such as predicted odometry.
-
-        OdometryReadings and NoticeReadings from elapsed time do not show that the board is alive.
-        """
+        """Process readings that follow from time alone, such as predicted odometry."""
         before = self._board.mode
         readings = self._board.elapse(now)
         self._reporter.events += self._measurement.hear(readings, now)
-        if all(isinstance(reading, OdometryReading | NoticeReading) for reading in readings):
-            self._safety.react(self._measurement.flush(), now)
-        else:
+        if _show_life(readings):
             self._liveness.heard_at, self._last = now, readings[-1]
             self.process(now)
+        else:
+            self._safety.react(self._measurement.flush(), now)
         if self._board.mode.running and not before.running:
             self._safety.set_out(now)
 
     def end(self, now: float) -> None:
         """Process the remaining readings, because the port was lost or closed."""
-        if readings := self._board.flush(now):
+        readings = self._board.flush(now)
+        if _show_life(readings):
             self._last = readings[-1]
         self._reporter.events += self._measurement.hear(readings, now)
         self.process(now)
         self._safety.react(self._measurement.release(), now)
+
+
+def _show_life(readings: Sequence[Reading]) -> bool:
+    """Return whether readings that came without new bytes show that the board is alive.
+
+    OdometryReadings, NoticeReadings and results of requests do not: they can follow from time.
+    """
+    for reading in readings:
+        content = reading.content if isinstance(reading, ExtraReading) else reading
+        if not isinstance(content, OdometryReading | NoticeReading | RequestDone):
+            return True
+    return False

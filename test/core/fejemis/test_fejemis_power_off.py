@@ -12,7 +12,7 @@ from omnibot_driver.core.fejemis.readings import (
     JobDone,
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings
-from omnibot_driver.core.requests import Request
+from omnibot_driver.core.requests import Request, RequestDone
 
 
 @pytest.fixture
@@ -49,6 +49,28 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
     bench.settle()
     bench.run(0.1)
     assert bench.robot.drive.off_at_s is None
+
+
+@pytest.mark.parametrize("closes", [False, True])
+def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
+    """The boards fall silent, and ~/start ends a running power off. Perhaps the ports close then.
+
+    The result of the power off does not come from the boards, so it does not confirm ~/start.
+    """
+    bench = nominal()
+    bench.board.services.ask(Job.POWER_OFF, None, bench.now)
+    bench.settle()
+    bench.run(0.3)
+    bench.speaks = set()
+    bench.run(0.1)
+    bench.session.request(Request.START, token := object(), bench.now)
+    if closes:
+        bench.close()
+    bench.settle()
+    bench.run(0.5)
+    assert [done.success for done in bench.extras(JobDone)] == [False]
+    answers = [e for e in bench.events if isinstance(e, RequestDone) and e.token is token]
+    assert not any(answer.success for answer in answers)
 
 
 def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> None:
