@@ -186,11 +186,11 @@ class FejemisBoard(Board):
             self._upkeep.machine.off()
 
     def leave(self) -> None:
-        """Switch brush and lift off at once, because the driver ends.
+        """Switch brush and lift off at once, and end the running job, because the driver ends.
 
         This method does not wait until the wheels have stopped.
         """
-        self._upkeep.machine.off()
+        self._upkeep.leave()
 
     def elapse(self, now: float) -> list[Reading]:
         """Check the timeouts, and return the readings that result, such as notices for the user."""

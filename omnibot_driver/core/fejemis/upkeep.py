@@ -32,6 +32,7 @@ class Upkeep:
     def __init__(self, ports: Ports, settings: FejemisSettings) -> None:
         self._ports, self._settings = ports, settings
         self.machine, self.jobs = Machine(), Jobs()
+        self._leaving = False
         self.configurations = {role: Configuration(role, settings.written) for role in ROLES}
         self.polls = {role: Polls(role) for role in ROLES}
 
@@ -47,6 +48,15 @@ class Upkeep:
         self.jobs.begin()
         for role in ROLES:
             self._begin(role)
+
+    def leave(self) -> None:
+        """End the running job, and send only lines for brush, lift and lights from now on.
+
+        Brush and lift are switched off.
+        """
+        self._leaving = True
+        self.machine.off()
+        self.jobs.cancel("the driver is shutting down")
 
     def restarted(self, role: Role) -> None:
         """Configure a restarted board again, and end what the restart has interrupted.
@@ -85,6 +95,8 @@ class Upkeep:
     @property
     def wake_at(self) -> float:
         """Time in s at which to call ``due`` next."""
+        if self._leaving:
+            return self.machine.wake_at
         times = [self.jobs.wake_at, self.machine.wake_at]
         for half in self._ports.halves:
             times.append(half.wake_at)
@@ -95,6 +107,8 @@ class Upkeep:
     def due(self, now: float, *, stands: bool) -> Packets:
         """Return the packets to send now; ``stands``: whether no motion is commanded."""
         packets = self._ports.ending("front", *self.machine.due(now))
+        if self._leaving:
+            return packets
         for role, texts in self.jobs.due(now).items():
             packets += self._ports.line(role, *texts)
         for channel, half in enumerate(self._ports.halves):

@@ -325,3 +325,25 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
     assert lines.index("rc 2 0 0") < lines.index("eer")
     begun = [at for at, _, data in bench.written if at >= mark and data.startswith(b";20eer")]
     assert begun[0] - mark > 0.4
+
+
+def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
+    """The driver shuts down while the robot brakes for a loading and a setting waits to be written.
+
+    The loading fails with this reason. Only stops follow, and the angles of the front wheel.
+    """
+    bench = nominal()
+    bench.drive_on(seconds=0.3)
+    bench.board.settings = FejemisSettings(written={Written.FRONT_WHEEL: (3.0, 0.0)})
+    bench.board.services.ask(Job.LOAD, None, bench.now)
+    bench.settle()
+    bench.run(0.2)
+    mark = bench.now
+    bench.session.shutdown.begin(bench.now)
+    bench.settle()
+    bench.run(0.6)
+    assert {text.split()[0] for text in bench.lines(DRIVE, mark)} == {"rc", "fwl"}
+    assert set(bench.lines(FRONT, mark)) == {"rc 2 0 0", "motv 0 0", "brush 0"}
+    (done,) = bench.extras(JobDone)
+    assert not done.success
+    assert "shutting down" in done.message
