@@ -85,6 +85,8 @@ class ModeManager:
         self._said_at = self._data_at = -math.inf
         self._flowed_s = 0.0
         self._paused_with_p = self._was_running = self._may_have_restarted = False
+        self._mode_known = False
+        """Whether the mode was known at the last reset, so that a notice can show a restart."""
         self._shown_at = math.inf
         self._request: Request | None = None
         self._token: object = None
@@ -159,7 +161,7 @@ class ModeManager:
                 self._wanted = Wanted.RUNNING
             self.phase = Phase.RESETTING
             self._deadline = now + RESET_WITHIN_S
-            self._say(self._board.reset(), now)
+            self._reset(now)
 
     def give_up_start(self) -> bool:
         """Return whether a ~/start is open that the board refuses. If so, fail it.
@@ -181,13 +183,14 @@ class ModeManager:
         ``continues``: whether the board was already paused before, and has not restarted since.
         """
         in_flight = now - self._said_at < IN_FLIGHT_S
+        restarted = self._mode_known and not continues
         running_wanted = self._wanted is Wanted.RUNNING
         if self.phase is Phase.PAUSING:
             self._shown_at = now
         elif self.phase is Phase.RESETTING and in_flight:
-            self._may_have_restarted |= not continues  # the next notice proves it by its number
-        elif self.phase is Phase.RESETTING and continues and not self._may_have_restarted:
-            self._say(self._board.reset(), now)
+            self._may_have_restarted |= restarted  # the next notice proves it by its number
+        elif self.phase is Phase.RESETTING and not (restarted or self._may_have_restarted):
+            self._reset(now)
         elif self.phase is Phase.RESETTING:
             if self._was_running:  # even after a pause that failed
                 self._wanted = Wanted.RUNNING
@@ -229,7 +232,7 @@ class ModeManager:
             self._paused_with_p = True
             self._say(self._board.pause(), now)
         elif self.phase is Phase.RESETTING and unheard:
-            self._say(self._board.reset(), now)
+            self._reset(now)
 
     def heard_nothing(self, now: float) -> None:
         """Record that the board is silent: it may be rebooting, or disconnected."""
@@ -277,6 +280,10 @@ class ModeManager:
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf
         self._flowed_s = 0.0
+
+    def _reset(self, now: float) -> None:
+        self._mode_known = self._board.mode is not Mode.UNKNOWN
+        self._say(self._board.reset(), now)
 
     def _say(self, packets: Packets, now: float) -> None:
         self.output += packets

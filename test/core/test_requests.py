@@ -194,6 +194,22 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
     assert "cable" in answer.message
 
 
+@pytest.mark.parametrize("connected_s", [0.1, 0.25])
+def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
+    """A reset is requested before the first «Paused» text, and the board does not receive R.
+
+    The first text has no earlier number to compare with, so it proves nothing. The reset fails.
+    """
+    bench = Bench(run=False)
+    bench.open()
+    bench.run(connected_s)
+    assert bench.session.state == "connecting"
+    bench.hears = False
+    answer = bench.ask(Request.RESET, 10.0)
+    assert not answer.success
+    assert "cable" in answer.message
+
+
 def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
     """A paused board does not receive R, and three of its «Paused» texts are lost.
 
