@@ -166,6 +166,13 @@ class Board(Protocol):
         """Decode the bytes that are still held when the line is closed. Return their readings."""
         return []
 
+    def discard(self) -> None:
+        """Discard the bytes that wait for later ones, because a long silence has followed them.
+
+        Otherwise a reading from them would get the time of the later bytes.
+        """
+        return
+
     def silence(self) -> None:
         """Forget the mode, because the board has been silent for ``Traits.silence_s``."""
 

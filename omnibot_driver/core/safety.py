@@ -146,6 +146,7 @@ class SafetyStops:
         if not liveness.fell_silent(now):
             return
         self.react(self._measurement.release(), now)
+        self._board.discard()
         self._measurement.restart()
         self._reporter.silent(  # a board that loses power leaves a partial frame
             liveness.silence_s,

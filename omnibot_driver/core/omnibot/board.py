@@ -203,13 +203,13 @@ class OmniBot:
         found = self._decoder.flush(now)
         return readings + self._translation.readings(found, self._decoder.skipped, now)
 
-    def silence(self) -> None:
-        """Forget the mode, because the board has been silent for too long.
-
-        Discard the held bytes too, because a frame in them would get the time of the next read.
-        """
+    def discard(self) -> None:
+        """Discard the held bytes, because a frame in them would get the time of the next read."""
         self._decode_pieces()
         self._decoder.flush(self._decoder.last_arrival_s)
+
+    def silence(self) -> None:
+        """Forget the mode, because the board has been silent for too long."""
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:

@@ -276,24 +276,6 @@ def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
     assert board.mode is Mode.UNKNOWN
 
 
-@pytest.mark.parametrize("waits", [ImuFrame((0, 0, -16384), (0, 0, -1)), DeltaFrame(7, 0, 0, 255)])
-def test_a_frame_that_waits_when_the_board_falls_silent_is_not_a_later_reading(
-    waits: Frame,
-) -> None:
-    """The last byte may begin a frame, so the decoder waits for more. Then the board is silent.
-
-    When data come again, the old frame is not among their readings, which have later stamps.
-    """
-    board = bot()
-    heard = board.receive(encode(REST) * 3 + encode(waits), 0.0)
-    assert len(heard) == 3
-    board.silence()
-    found = board.receive(encode(REST) * 4, 60.0)
-    assert [reading for reading in found if not isinstance(reading, ImuReading)] == []
-    assert len(found) == 4
-    assert len(set(found)) == 1
-
-
 def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
     """A connection ends within a frame.
 
