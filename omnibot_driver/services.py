@@ -73,9 +73,12 @@ class Services:
     def _on_reset_odometry(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        self._link.call(lambda session, now: session.reset_odometry(now))
-        response.success = True
-        response.message = "odometry set to zero"
+        try:
+            self._link.call(lambda session, now: session.reset_odometry(now))
+        except RequestRefused as error:
+            response.success, response.message = False, str(error)
+        else:
+            response.success, response.message = True, "odometry set to zero"
         return response
 
     async def _on_start(

@@ -273,9 +273,12 @@ class Session:
     def reset_odometry(self, now: float) -> None:
         """Move the origin of the odometry frame to the robot's current pose.
 
-        A goal of ``cmd_pose`` in the old frame is dropped.
+        A goal of ``cmd_pose`` in the old frame is dropped. Raises RequestRefused without recent
+        data from the board.
         """
         self.inbound.process(now)
+        if reason := self.interlocks.why_not_reset_odometry(now):
+            raise RequestRefused(f"odometry not reset: {reason}")
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()
         self._reporter.notify(self._commanding.check_goal([], now))

@@ -295,12 +295,13 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
-    """The port does not exist. Start, pause and reset fail at once.
+    """The port does not exist. Start, pause, reset and the reset of the odometry fail at once.
 
     The e-stop can still be latched.
     """
     probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
-    for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:
+    triggers = [(Trigger, name) for name in ("start", "reset", "reset_odometry")]
+    for kind, service in [*triggers, (SetBool, "pause")]:
         answer = probe.call(kind, service)
         assert not answer.success
         assert "port is not open" in answer.message

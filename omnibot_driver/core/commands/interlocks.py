@@ -7,6 +7,8 @@ empty string if there is no reason. This module knows the board's mode, and whet
 progress.
 """
 
+from typing import Final
+
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.commands.set_points import Setpoint
@@ -14,6 +16,9 @@ from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.mode_manager import ModeManager, Phase
 from omnibot_driver.core.requests import Request
+
+NOT_OPEN: Final = "the port is not open; connect the board, then call again"
+NO_VALID_DATA: Final = "no valid data from the board; check its power and cable, then call again"
 
 
 class Interlocks:
@@ -77,12 +82,27 @@ class Interlocks:
             return refusal
         return tripped
 
+    def why_not_reset_odometry(self, now: float) -> str:
+        """Return the reason why the odometry cannot be reset; empty if it can.
+
+        Without recent data, the robot's place is unknown. Later data would add motion from before
+        the reset.
+        """
+        mode, unheard_s = self._board.mode, self._liveness.unheard_s
+        if self._mode_manager.phase is Phase.CLOSED:
+            return NOT_OPEN
+        if mode is Mode.UNKNOWN:
+            return self.missing or NO_VALID_DATA
+        if mode.running and self._liveness.unheard(now):
+            return f"no data from the board for {unheard_s:g} s; call again when data arrive"
+        return ""
+
     def why_not_task(self) -> str:
         """Return the reason why a task, such as a recording, cannot begin; empty if it can."""
         if self.leaving:
             return self.why_not_request()
         if self._mode_manager.phase is Phase.CLOSED:
-            return "the port is not open; connect the board, then call again"
+            return NOT_OPEN
         if self._policy.latched:
             return "the e-stop is latched; release it, then call again"
         if not self._board.mode.running:
@@ -95,11 +115,11 @@ class Interlocks:
         if self.leaving or self.missing:
             return self.why_not_request()
         if phase is Phase.CLOSED:
-            return "the port is not open; connect the board, then call again"
+            return NOT_OPEN
         if phase is Phase.RESETTING:
             return f"the board is {phase.value}; call again when it runs"
         if mode is Mode.UNKNOWN:
-            return "no valid data from the board; check its power and cable, then call again"
+            return NO_VALID_DATA
         if not mode.running:
             return f"the board is {mode.value}; call ~/start, then call again"
         if self._calibration.measuring:

@@ -6,9 +6,10 @@ import itertools
 import math
 
 import pytest
-from robots import standing
+from robots import push, standing
 from session_bench import Bench, bare
 
+from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
@@ -80,6 +81,35 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
     way = bench.board.truth.x_m - way_before
     unreported = 0.04 * 0.5
     assert 0.0 <= bench.odometry[-1].pose.x_m - way <= unreported
+
+
+def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_closed(
+    bench: Bench,
+) -> None:
+    """A cable is lost and the robot is pushed. The data after the gap will show this motion.
+
+    So a reset would not be true. It is refused until data arrive again, and then succeeds.
+    """
+    bench.speaks = False
+    bench.run(0.5)
+    with pytest.raises(RequestRefused, match="no data"):
+        bench.session.reset_odometry(bench.now)
+    bench.run(1.5)
+    with pytest.raises(RequestRefused, match="no valid data"):
+        bench.session.reset_odometry(bench.now)
+    bench.close()
+    push(bench, 1.0, 0.0, 0.0)
+    with pytest.raises(RequestRefused, match="port is not open"):
+        bench.session.reset_odometry(bench.now)
+    bench.open()
+    bench.run(0.1)
+    with pytest.raises(RequestRefused, match="no valid data"):
+        bench.session.reset_odometry(bench.now)
+    bench.speaks = True
+    bench.run_until_state("nominal")
+    bench.session.reset_odometry(bench.now)
+    bench.run(1.0)
+    assert bench.odometry[-1].pose.way_m < 0.002
 
 
 @pytest.mark.slow
