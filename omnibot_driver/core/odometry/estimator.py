@@ -102,6 +102,8 @@ class Odometry:
         self._bridge = GapInterpolation()
         self._last_stamp_s: float | None = None
         self.reset()
+        self._is_reset = False
+        """Whether the odometry was reset, and no displacement has arrived since then."""
 
     @property
     def refused_poses(self) -> int:
@@ -125,7 +127,8 @@ class Odometry:
         """Move the origin of the odometry frame to the robot's current pose.
 
         Return the estimates of displacements that were still waiting for a pose. Displacements that
-        waited for the board's first pose are discarded.
+        waited for the board's first pose are discarded. If the next displacement contains a pause,
+        its motion is discarded too.
         """
         self.alignments += 1
         due = []
@@ -135,11 +138,18 @@ class Odometry:
                 self._belief.proved = None  # the next pose would also correct the old motion
         self._backlog = PendingDisplacements()
         self._track.begin()
+        self._is_reset = True
         return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """Add a displacement; return its estimates, or none while it waits for a pose."""
         estimates = []
+        if self._is_reset:
+            self._is_reset = False
+            if reading.duration_s is None:  # most of its motion is older than the reset
+                self.displace(reading, stamp_s)
+                self.reset()
+                return []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
             self._backlog = PendingDisplacements()

@@ -112,6 +112,29 @@ def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_clos
     assert bench.odometry[-1].pose.way_m < 0.002
 
 
+def test_a_reset_of_the_odometry_during_a_pause_forgets_the_motion_in_the_pause(
+    bench: Bench,
+) -> None:
+    """The robot is pushed by 1 m during a pause. Then the odometry is reset and the board started.
+
+    Odom begins at zero, although the board's first displacement contains the push.
+    """
+    assert bench.ask(Request.PAUSE, 5.0).success
+    push(bench, 1.0, 0.0, 0.3)
+    bench.run(1.2)
+    bench.session.reset_odometry(bench.now)
+    bench.events.clear()
+    assert bench.ask(Request.START, 5.0).success
+    bench.run(1.0)
+    assert len(bench.odometry) > 20
+    assert max(estimate.pose.way_m for estimate in bench.odometry) < 0.002
+    assert max(abs(estimate.pose.yaw_rad) for estimate in bench.odometry) < 0.002
+    push(bench, 0.02, 0.0, 0.0)
+    bench.run(0.5)
+    pose = bench.odometry[-1].pose
+    assert (pose.x_m, pose.y_m) == pytest.approx((0.02, 0.0), abs=0.002)
+
+
 @pytest.mark.slow
 def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
     """Frames are lost thirty times. The driver combines the losses in only one or two notices."""
