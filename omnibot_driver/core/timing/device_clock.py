@@ -58,6 +58,7 @@ class DeviceClock:
     def __init__(self, period_s: float) -> None:
         self._period_s = period_s
         self._calm_s = CALM * period_s
+        self._longest_loss_s = LARGEST_LOSS_TICKS * period_s
         self._tick = 0
         self._stamp_s = -math.inf
         self.restart()
@@ -112,6 +113,8 @@ class DeviceClock:
 
         ``edge``: where the read ended, relative to the board's samples; None if unknown.
         """
+        if self._stamped_tick is None and now - self._seen_at > self._longest_loss_s:
+            self.restart()  # only a part of a sample has arrived, long ago
         ticks = self._count(readings)
         if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
             stamp_s = self._due(ticks[0], now, edge, len(ticks))
