@@ -273,11 +273,11 @@ class Session:
     def reset_odometry(self, now: float) -> None:
         """Move the origin of the odometry frame to the robot's current pose.
 
-        A goal of ``cmd_pose`` in the old frame is dropped. Raises RequestRefused without recent
-        data from the board.
+        A goal of ``cmd_pose`` in the old frame is dropped. Raises RequestRefused while the board is
+        silent or the port is closed.
         """
         self.inbound.process(now)
-        if reason := self.interlocks.why_not_reset_odometry(now):
+        if reason := self.interlocks.why_not_reset_odometry():
             raise RequestRefused(f"odometry not reset: {reason}")
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()

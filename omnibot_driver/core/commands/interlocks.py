@@ -82,20 +82,15 @@ class Interlocks:
             return refusal
         return tripped
 
-    def why_not_reset_odometry(self, now: float) -> str:
+    def why_not_reset_odometry(self) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
-        Without recent data, the robot's place is unknown. Later data would add motion from before
-        the reset.
+        While the board is silent, the robot's place is unknown. Later data would add motion from
+        before the reset.
         """
-        mode, unheard_s = self._board.mode, self._liveness.unheard_s
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN
-        if mode is Mode.UNKNOWN:
-            return self.missing or NO_VALID_DATA
-        if mode.running and self._liveness.unheard(now):
-            return f"no data from the board for {unheard_s:g} s; call again when data arrive"
-        return ""
+        return (self.missing or NO_VALID_DATA) if self._board.mode is Mode.UNKNOWN else ""
 
     def why_not_task(self) -> str:
         """Return the reason why a task, such as a recording, cannot begin; empty if it can."""
