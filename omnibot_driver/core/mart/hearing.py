@@ -44,8 +44,9 @@ class Hearing(Measuring):
         if isinstance(reply, Ok) and reply.form is Form.NAME:
             self._named(reply, now)
             return
-        if self.state is State.LOST or (self._stopping is not None and self._stopping.last_port):
-            self._outlives(reply)
+        last_port = self._stopping is not None and self._stopping.last_port
+        if last_port or self.state in (State.LOST, State.ASKING):
+            self._outlives(reply, now)
         if self.state is State.LOST:
             return
         if self._stopping is not None:
@@ -97,6 +98,8 @@ class Hearing(Measuring):
         if self.state is State.LOST:
             self._ask_what_moves(now)
             self._named_s = self._name_from_s
+        if self.state is State.ASKING:
+            self._ask_s = max(self._ask_s, now + self._delay_s)  # earlier replies may come later
 
     def _hurry(self, now: float) -> None:
         """Shorten the wait for a reply, because the server has already answered a later HELLO.

@@ -280,7 +280,7 @@ class Stops(Ground, ABC):
             halt=True,
         )
 
-    def _outlives(self, reply: Reply) -> None:
+    def _outlives(self, reply: Reply, now: float) -> None:
         """Record that the server answers a stop only after the driver has used the stop port.
 
         In this state, the server's stop port could hang the next forward drive (RM); see
@@ -289,6 +289,10 @@ class Stops(Ground, ABC):
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return
+        network = self.conversation
+        asked = network.pending is not None or now < network.late_until_s(Form.NOTHING)
+        if self.state is State.ASKING and asked:
+            return  # it may answer RST IMU or MSM
         if reply.form is Form.NOTHING and reply.form in ANSWERS.get(self.motion, ()):
             self.health.outlives()
 
