@@ -1,0 +1,142 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of a server that was lost: the driver uses the stop port, and then asks what moves."""
+
+import pytest
+from mart_bench import MartBench
+
+from omnibot_driver.simulator.common.network import NetworkFaults
+from omnibot_driver.simulator.mart import Firmware
+
+pytestmark = pytest.mark.slow
+
+
+def outlived(
+    firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
+) -> MartBench:
+    """Return a bench whose IMU died in a motion and works again, with a stop port that hangs."""
+    bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
+    bench.command(*motion, 2.5)
+    bench.server.imu.alive = False
+    bench.command(*motion, 3.0)
+    bench.run(7.0)
+    assert any(notice.startswith("server lost: ") for notice in bench.notices)
+    bench.server.imu.alive = True
+    bench.run(5.0)
+    assert bench.robot.board.facts["stop_port_hung"]
+    return bench
+
+
+@pytest.mark.parametrize(
+    ("motion", "firmware", "boot_s", "gap_s"),
+    [
+        ((0.3, 0.1), "source", 0.3, 2.0),
+        ((0.3, 0.1), "source", 5.0, 3.5),
+        ((0.3, 0.1), "firmware", 5.0, 3.5),
+        ((-0.2, 0.0), "source", 5.0, 2.0),
+    ],
+)
+def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
+    motion: tuple[float, float], firmware: Firmware, boot_s: float, gap_s: float
+) -> None:
+    """The IMU dies in a motion and works again later, but the server's stop port stays hung.
+
+    The driver refuses motion until the heading shows a restart. A gap in the network does not end
+    the refusal.
+    """
+    bench = outlived(firmware, motion)
+    bench.speaks = False
+    bench.run(gap_s)
+    assert bench.session.state == "connecting"  # a gap in the network is not a restart
+    bench.speaks = True
+    bench.run(2.0)
+    way_m = bench.server.chassis.way_m
+    assert "restart the server" in bench.try_command(0.3, 0.0)
+    bench.command(0.3, 0.0, 5.0)
+    assert bench.server.chassis.way_m == way_m
+    bench.server.restart(boot_s)
+    bench.run(boot_s + 5.0)
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("delay_s", [0.05, 0.3])
+def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
+    delay_s: float, seed: int
+) -> None:
+    """The IMU works again, so the server answers all waiting requests at once.
+
+    Its name can then arrive before the reply to the stop in which it hung. This reply decides that
+    the driver refuses motion.
+    """
+    bench = outlived("source", (0.3, 0.1), delay_s, seed)
+    way_m = bench.server.chassis.way_m
+    assert "restart the server" in bench.try_command(0.3, 0.0)
+    bench.command(0.3, 0.0, 5.0)
+    assert bench.server.chassis.way_m == way_m
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.05])
+@pytest.mark.parametrize("wait_s", [3.0, 5.0])
+def test_a_driver_that_finds_a_hung_server_does_not_drive_it(wait_s: float, delay_s: float) -> None:
+    """A driver starts while the server executes RM, and the IMU has died.
+
+    The server hangs in the first stop, and the driver uses the stop port. When the IMU works again,
+    the driver refuses motion.
+
+    ``wait_s``: time in s from the driver's start until the IMU works again.
+    """
+    bench = MartBench("source", NetworkFaults(delay_s=delay_s))
+    bench.server.receive(b"RM 30", 0, None, 0.0)
+    bench.run(2.0)
+    bench.server.imu.alive = False
+    bench.run(0.3)
+    bench.open()
+    bench.run(wait_s)
+    bench.server.imu.alive = True
+    bench.run(6.0)
+    assert bench.session.state == "nominal"
+    assert bench.robot.board.facts["stop_port_hung"]
+    assert "restart the server" in bench.try_command(0.3, 0.0)
+    bench.command(0.3, 0.0, 5.0)
+    assert bench.robot.stands
+
+
+def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_hangs() -> None:
+    """The port is lost and opens again. The server is the same, so its stop port still hangs.
+
+    After a restart of the server, the driver accepts motions again.
+    """
+    bench = outlived("source", (0.3, 0.1))
+    bench.session.closed(bench.now)
+    bench.run(1.0)
+    bench.open()
+    bench.run(5.0)
+    assert bench.session.state == "nominal"
+    assert "restart the server" in bench.try_command(0.3, 0.0)
+    bench.server.restart(0.3)
+    bench.run(5.0)
+    assert bench.try_command(0.3, 0.0) == ""
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
+def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
+    """The server's process is stopped while the robot is at rest, and continues after 5 s.
+
+    Meanwhile the driver has used the stop port. The server then answers the queries that have
+    waited. The driver does not take their values for the end of a motion.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.3, 0.3, 2.0)
+    bench.command(0.0, 0.0, 2.0)
+    bench.run(offset_s)
+    advance = bench.robot.advance
+    bench.robot.advance = lambda: []
+    bench.run(5.0)
+    assert b"SL" in bench.said()
+    bench.robot.advance = advance
+    bench.run(5.0)
+    assert bench.try_command(0.3, 0.0) == ""
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
