@@ -45,6 +45,14 @@ class Asking(Stops):
         self._stop_again_s = now + STOP_AGAIN_S
         self._ask_s = now
 
+    def _stop_at_once(self, now: float) -> None:
+        """Let the driver use the stop port now, if it waits for a lost server or asks it."""
+        if self.state is State.LOST:
+            self._said_lost_s = -math.inf
+        elif self.state is State.ASKING:
+            self.conversation.give_up(now)
+            self._named_s = self._stop_again_s = self._ask_s = -math.inf
+
     def _keep_asking(self, now: float) -> Packets:
         if self.conversation.pending is not None or now < self._ask_s:
             return ()
@@ -79,7 +87,8 @@ class Asking(Stops):
         elif abs(count - before[0]) > STRAY_COUNTS:
             self._sweep(now)
         else:
-            self._lose(now, "the robot is at rest, but the server still reports a motion")
+            # the left wheel, which has no encoder, may turn; the stops of a lost server end that
+            self._lose(now, "the right wheel is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
         """Begin to stop any motion by the commands SRM and SM.

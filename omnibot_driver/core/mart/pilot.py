@@ -84,6 +84,8 @@ class Pilot(Hearing):
             move = None
         if wanted is not None and not (move and self.jobs.job is Job.TURN_RECORD):
             self.jobs.cancel(ESTOPPED if isinstance(wanted, EmergencyStop) else COMMANDED)
+        if isinstance(wanted, EmergencyStop) and wanted is not self._wanted:
+            self._stop_at_once(now)
         if wanted is not self._wanted:
             self._move = move.repeated() if move and not docks else None
             if is_standstill(self._wanted) or is_standstill(wanted):

@@ -18,6 +18,7 @@ from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.required_motion import STANDING, moving_order, required_motion
 from omnibot_driver.core.mart.states import (
     HALTS,
+    LAST_HALTS,
     ROLLING,
     Motion,
     State,
@@ -268,7 +269,7 @@ class Stops(Ground, ABC):
         """
         self._stopping = None
         self.state = State.LOST
-        self._said_lost_s = now if why else -math.inf
+        self._said_lost_s = -math.inf
         if self._lost_told:
             return
         self._lost_told = True
@@ -300,7 +301,8 @@ class Stops(Ground, ABC):
         if now < self._said_lost_s + LOST_REPEAT_S:
             return NO_PACKETS
         self._said_lost_s = now
-        said = () if self.motion is Motion.UNKNOWN else HALTS[self.motion]
+        unknown = self.motion is Motion.UNKNOWN
+        said = LAST_HALTS[self.motion] if unknown else HALTS[self.motion]
         return self._send(said, now) + self._greet(now)
 
     @abstractmethod

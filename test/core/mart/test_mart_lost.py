@@ -140,3 +140,69 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
     assert bench.try_command(0.3, 0.0) == ""
     bench.command(0.3, 0.0, 3.0)
     assert not bench.robot.stands
+
+
+def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
+    """Return a bench whose driver starts while RM turns the robot about its right wheel.
+
+    The network fails for the first ``away_s`` seconds, so the driver has used the stop port.
+    """
+    bench = MartBench(firmware)
+    bench.server.receive(b"RM 30", 0, None, 0.0)
+    bench.run(0.7)
+    bench.server.receive(b"RMCS -30 0", 0, None, bench.robot.board.now_s)
+    bench.run(1.0)
+    bench.hears = bench.speaks = False
+    bench.open()
+    bench.run(away_s)
+    bench.hears = bench.speaks = True
+    return bench
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+@pytest.mark.parametrize("away_s", [4.0, 6.0])
+def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
+    away_s: float, firmware: Firmware
+) -> None:
+    """Only the right wheel has an encoder. It stands while the robot turns about it.
+
+    The driver finds that the server has a motion in progress, so it sends SL and SS, and repeats
+    them.
+    """
+    bench = met_in_a_pivot(firmware, away_s)
+    assert abs(bench.robot.board.facts["yaw_rate_radps"]) > 0.5
+    bench.run(4.0)
+    assert bench.robot.stands
+    assert any("the right wheel is at rest" in notice for notice in bench.notices)
+
+
+def test_the_e_stop_stops_a_robot_while_the_driver_asks_what_moves() -> None:
+    """The network is back, and the driver asks the server which motion is in progress.
+
+    The e-stop does not wait for the result: the driver uses the stop port at once.
+    """
+    bench = met_in_a_pivot("firmware", 4.0)
+    bench.run(0.5)
+    assert "asking the server" in bench.board._pilot.state.value
+    said = len(bench.written)
+    bench.estop(True)
+    bench.run(0.02)
+    assert bench.said(said)[:2] == [b"SL", b"SS"]
+    assert bench.until_it_stands(1.0) < 0.5
+
+
+def test_the_e_stop_repeats_the_stop_of_a_lost_server_at_once() -> None:
+    """The server hangs in the stop of RM. The driver repeats SRM once a second.
+
+    The e-stop does not wait for the next repetition.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.3, 0.1, 2.5)
+    bench.server.imu.alive = False
+    bench.command(0.3, 0.1, 3.0)
+    bench.run_until(lambda: bench.session.board._pilot.state.value.startswith("lost"), 10.0)
+    bench.run(0.5)
+    said = len(bench.written)
+    bench.estop(True)
+    bench.run(0.02)
+    assert bench.said(said)[:1] == [b"SRM"]
