@@ -71,7 +71,6 @@ class Health:
     def __init__(self, imu: ImuProof) -> None:
         self._imu = imu
         self.outlived = self._may_be_restarted = False
-        self._heading_rad: float | None = None
         self.connect()
 
     def connect(self) -> None:
@@ -155,7 +154,6 @@ class Health:
     def restarted(self) -> None:
         """Record that the server was restarted, so that its stop port does not hang."""
         self.outlived = self._may_be_restarted = False
-        self._heading_rad = None
 
     def was_silent(self) -> None:
         """Record that the server may have been restarted; its next heading at rest decides it."""
@@ -164,13 +162,12 @@ class Health:
     def rests(self, heading_rad: float) -> None:
         """Evaluate the heading of a robot at rest, if the server may have been restarted.
 
-        A restarted server reports a heading near zero, or one that differs from the last one.
+        A restarted server reports a heading near zero. A change of the heading proves nothing: the
+        gyro drifts, and a user may turn the robot.
         """
         if not self.outlived or not abs(heading_rad) < MOST_RAD:
             return
-        before_rad, self._heading_rad = self._heading_rad, heading_rad
-        same = before_rad is None or abs(heading_rad - before_rad) <= OLD_RAD
-        if self._may_be_restarted and not (same and abs(heading_rad) > OLD_RAD):
+        if self._may_be_restarted and abs(heading_rad) <= OLD_RAD:
             self.restarted()
         self._may_be_restarted = False
 

@@ -33,6 +33,7 @@ def outlived(
         ((0.3, 0.1), "source", 0.3, 2.0),
         ((0.3, 0.1), "source", 5.0, 3.5),
         ((0.3, 0.1), "firmware", 5.0, 3.5),
+        ((0.3, 0.1), "firmware", 5.0, 40.0),
         ((-0.2, 0.0), "source", 5.0, 2.0),
     ],
 )
@@ -42,11 +43,12 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     """The IMU dies in a motion and works again later, but the server's stop port stays hung.
 
     The driver refuses motion until the heading shows a restart. A gap in the network does not end
-    the refusal.
+    the refusal, although the heading drifts, and a user turns the robot by hand meanwhile.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
     bench.run(gap_s)
+    bench.server.imu.heading_deg += 2.0
     assert bench.session.state == "connecting"  # a gap in the network is not a restart
     bench.speaks = True
     bench.run(2.0)
