@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.mart.goal import INCH_M
-from omnibot_driver.core.mart.words import TB, TF, Request
+from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
 """A move is regarded as incomplete if its measured distance or turn is below this fraction.
@@ -98,6 +98,12 @@ class Done:
     @property
     def _seen(self) -> float:
         return abs(self.way_m if self.is_straight else self.turned_rad)
+
+    @property
+    def went_the_wrong_way(self) -> bool:
+        """Whether the right wheel has turned far against the direction of the request."""
+        seen = self.way_m if self.is_straight else self.turned_rad
+        return (seen if self.request.word in (TB, MCR) else -seen) > self._least
 
     @property
     def contradicts_the_server(self) -> bool:

@@ -35,6 +35,10 @@ CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"
     " may be stuck or slip, so the heading is uncertain"
 )
+WRONG_WAY: Final = (
+    "the right wheel turned against the direction of a controlled move: check `encoder_inverted`,"
+    " and the wiring of motors and encoder"
+)
 DISCARDED: Final = "; the goal of cmd_pose is discarded: remove the cause, then send the goal again"
 OFF_COURSE_RAD: Final = 0.5
 """Standard deviation in rad of the turn in a move that fails because one wheel does not turn.
@@ -173,7 +177,10 @@ class Moves(Asking):
             error = done.asked * (1.0 if likely or done.ended_late else UNLIKELY)
             self.odometry.doubt.add(*((error**2, 0.0) if done.is_straight else (0.0, error**2)))
         self.odometry.rest(done.longest)
-        if twice:
+        if done.went_the_wrong_way and self._move is not None and not self._move.given_up:
+            self._move.fail()
+            self._notice(WRONG_WAY + DISCARDED, halt=True)
+        elif twice:
             self.odometry.run_before(done.is_straight, self._surplus.expected(move))
             self._notice(RAN_TWICE, halt=False)
         elif completed and likely and doubtful and done.is_large:

@@ -343,3 +343,28 @@ def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
     bench.go_to(0.5, 0.0, 0.0)
     bench.run(3.0)
     assert bench.server.chassis.way_m > 0.0
+
+
+@pytest.mark.parametrize(
+    ("goal", "faults"),
+    [
+        ((2.0, 0.0, 0.0), NetworkFaults()),
+        ((2.0, 0.0, 0.0), NetworkFaults(lose=0.1, delay_s=0.05)),
+        ((30.0, 0.0, 0.0), NetworkFaults()),
+        ((0.0, 2.0, 0.0), NetworkFaults()),
+    ],
+)
+def test_a_goal_ends_after_a_move_in_which_the_wheel_counts_the_wrong_way(
+    goal: tuple[float, float, float], faults: NetworkFaults
+) -> None:
+    """The encoder counts down while the robot drives forward, so each move increases the distance.
+
+    The driver discards the goal after the first move, and a notice names the parameter.
+    """
+    bench = MartBench(faults=faults, encoder_sign=-1).ready()
+    bench.go_to(*goal)
+    bench.run(20.0 + 2.5 * goal[0])
+    moves = [data for data in bench.said() if data.split()[0] in (b"TF", b"TB", b"MCR", b"MCL")]
+    assert len(moves) == 1
+    assert bench.robot.stands
+    assert any("`encoder_inverted`" in notice for notice in bench.notices)
