@@ -48,7 +48,8 @@ class Measuring(Starts):
             before_rad = self.odometry.heading.angle_rad
             changed = self._turned(reply.number, answer.when, now)
             if self._shows_restart(before_rad):
-                self.health.restarted()
+                if before_rad is not None:
+                    self.health.restarted()
                 self.jobs.forget_log()
             elif reply.number and self._started_s < self.appeared_s <= answer.when.from_s:
                 self.jobs.log_may_be_lost = False  # a restarted server reports zero until RM

@@ -79,10 +79,14 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     assert bench.server.chassis.way_m == way_m
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 0.05])
-@pytest.mark.parametrize("wait_s", [3.0, 5.0])
-def test_a_driver_that_finds_a_hung_server_does_not_drive_it(wait_s: float, delay_s: float) -> None:
-    """A driver starts while the server executes RM, and the IMU has died.
+@pytest.mark.parametrize(
+    ("met", "wait_s", "delay_s"),
+    [(b"RM 30", 3.0, 0.0), (b"RM 30", 5.0, 0.0), (b"RM 30", 5.0, 0.05), (b"B SLOW", 5.0, 0.0)],
+)
+def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
+    met: bytes, wait_s: float, delay_s: float
+) -> None:
+    """A driver starts while the server executes RM or B, and the IMU has died.
 
     The server hangs in the first stop, and the driver uses the stop port. When the IMU works again,
     the driver refuses motion.
@@ -90,7 +94,7 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(wait_s: float, dela
     ``wait_s``: time in s from the driver's start until the IMU works again.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
-    bench.server.receive(b"RM 30", 0, None, 0.0)
+    bench.server.receive(met, 0, None, 0.0)
     bench.run(2.0)
     bench.server.imu.alive = False
     bench.run(0.3)
