@@ -29,6 +29,7 @@ from omnibot_driver.core.readings import (
 )
 from omnibot_driver.core.reporter import Reporter
 
+BUTTON: Final = "the button on the robot"
 BUTTON_HELD: Final = (
     "e-stop not released: the e-stop button on the robot was pressed and its release was not"
     " reported; release the button, then call again. If it is released already, press and release"
@@ -79,9 +80,12 @@ class SafetyStops:
                     self._policy.halt(now)
                 self._mode_manager.heard_paused(now, continues=reading.continues)
             elif isinstance(reading, EStopButtonReading):
-                self._button_held = reading.pressed
+                unreported, self._button_held = not self._button_held, reading.pressed
                 if reading.pressed:
-                    self.estop(True, now, by="the button on the robot")
+                    self.estop(True, now, by=BUTTON)
+                elif unreported:
+                    by = f"{BUTTON}; its release was reported, but not its press"
+                    self.estop(True, now, by=by)
             elif isinstance(reading, NoticeReading):
                 if reading.text:
                     notify([reading.text])

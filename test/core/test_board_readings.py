@@ -141,6 +141,17 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
     assert "e-stop latched by the button on the robot" in bench.notices
 
 
+def test_a_release_of_the_button_without_its_press_latches_the_estop(bench: AnyBench) -> None:
+    """The message of a press is lost, so only the release arrives. It proves the press."""
+    bench.drive_on()
+    tell(bench, EStopButtonReading(False))
+    assert bench.session.estop_active
+    assert any("its release was reported, but not its press" in text for text in bench.notices)
+    bench.estop(False)
+    bench.drive_on()
+    assert not bench.robot.stands
+
+
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
     """The user requests a reset. A report of an earlier reset, from before the request, is ignored.
 

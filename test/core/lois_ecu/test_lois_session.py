@@ -13,7 +13,7 @@ from lois_drives import HOST_GAINS
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, Setting, Stream, encode_command
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
-from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading
+from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.requests import Request
@@ -40,6 +40,30 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
     bench.estop(False)
     bench.drive_on()
     assert not bench.robot.stands
+
+
+@pytest.mark.slow
+@FIRMWARE
+def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
+    """The user presses and releases the e-stop button while the board sends a record.
+
+    The board reports only the release. The button was pressed, so the driver latches the e-stop.
+    """
+    bench = Bench(firmware)
+    bench.drive_on(0.6, 1.0)
+    board = bench.session.board
+    assert isinstance(board, LoisEcuBoard)
+    board.record(RecordKind.RPM, 50)
+    while not told(bench, RecordComes):
+        bench.drive(0.6)
+        bench.run(TICK_S)
+    bench.board.press(True)
+    bench.run(2 * TICK_S)
+    bench.presses(False)
+    assert bench.session.estop_active
+    assert any("its release was reported, but not its press" in text for text in bench.notices)
+    bench.estop(False)
+    assert not bench.session.estop_active
 
 
 @pytest.mark.slow
