@@ -54,8 +54,8 @@ CONTRADICTED_S: Final = 1.0
 at most this time in s since the last tick report. Without the unit, the clock cannot confirm how
 long ago that report came."""
 IN_FLIGHT_S: Final = 0.5
-"""Time in s, after the first counts that follow a reset, in which counts may still be from before
-the reset: the board sent them before it received the reset, or the driver read them late."""
+"""Time in s, after the read of the first counts that follow a reset, in which counts may still be
+from before the reset: the board sent them before it received the reset, or they were read late."""
 
 
 class Translation:
@@ -117,20 +117,23 @@ class Translation:
         clock_unit: ClockUnit | None,
         now: float,
     ) -> list[LoisReading]:
-        """Return the readings of the reports, in order. ``times``: when each report arrived."""
+        """Return the readings of the reports, in order.
+
+        ``times``: when each report arrived, corrected for late reads. ``now``: time of the read.
+        """
         self._gps_works = False
         found: list[LoisReading] = []
         for at, report in zip(times, reports, strict=True):
-            found += self._readings(report, clock_unit, at)
+            found += self._readings(report, clock_unit, at, now)
         return found
 
     def _readings(
-        self, report: Report, clock_unit: ClockUnit | None, now: float
+        self, report: Report, clock_unit: ClockUnit | None, now: float, read_s: float
     ) -> list[LoisReading]:
         odometry = self.odometry
         match report:
             case Ticks():
-                if self._was_reset(report, now):
+                if self._was_reset(report, read_s):
                     self.connect()
                 restarted = self._watch(report, clock_unit, now)
                 self._late_s = self._time.late_s(report.time_counts, self._unit, now)
@@ -171,21 +174,22 @@ class Translation:
                 return [report]
         return []
 
-    def _was_reset(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the board has obeyed a reset since the last ticks.
+    def _was_reset(self, ticks: Ticks, read_s: float) -> bool:
+        """Return whether the board may have obeyed a reset since the last ticks.
 
-        It has if the counts are nearer to zero than to the last counts.
+        This is so if a count is nearer to zero than before.
+
+        ``read_s``: time of the read, which is not corrected for a late read.
         """
         before, until_s = self._ticks, self._reset_until_s
         if until_s is None:
             return False
         if before is None:
-            self._reset_until_s = now + IN_FLIGHT_S
+            self._reset_until_s = read_s + IN_FLIGHT_S
             return False
-        if now >= until_s:
+        if read_s >= until_s:
             self._reset_until_s = None  # the next ticks are certainly from after the reset
-        rolled = abs(wrapped(ticks.left - before.left)) + abs(wrapped(ticks.right - before.right))
-        return abs(ticks.left) + abs(ticks.right) < rolled
+        return abs(ticks.left) < abs(before.left) or abs(ticks.right) < abs(before.right)
 
     def _watch(self, ticks: Ticks, clock_unit: ClockUnit | None, now: float) -> list[LoisReading]:
         before, self._ticks = self._ticks, ticks

@@ -19,6 +19,7 @@ from omnibot_driver.core.lois_ecu import (
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.translation import Translation
 
 WAITS_S = st.sampled_from([0.0, 0.001, 0.01, 0.2, 0.7, 5.0])
 GROUPS = st.builds(
@@ -83,6 +84,19 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
     odometry.heard_odometry(group, 10.2)
     (estimate,) = odometry.heard_ticks(Ticks(200, 16, 36), 10.3)
     assert math.isfinite(estimate.covariance.xx)
+
+
+def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_motion() -> None:
+    """The counts 5 were sent before a reset. The wheels then roll out, so the next counts are 3.
+
+    The smaller counts do not show that the board counts backward.
+    """
+    translation = Translation(LoisEcuSettings())
+    translation.reset()
+    translation.readings([Ticks(1000, 5, 5)], [10.0], "ms", 10.0)
+    translation.readings([Ticks(1200, 3, 3)], [10.2], "ms", 10.2)
+    assert not translation.odometry._motion.signed
+    assert translation.ticks == Ticks(1200, 3, 3)
 
 
 @pytest.mark.parametrize("restarted", [True, False])

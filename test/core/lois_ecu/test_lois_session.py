@@ -283,10 +283,13 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
 
 @pytest.mark.slow
 @FIRMWARE
-def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str) -> None:
+@pytest.mark.parametrize("stall_s", [0.0, 1.3])
+def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_s: float) -> None:
     """The user resets the board while its counts are on the line. The driver then reads 0 counts.
 
     The difference is not a motion, and does not show that the board counts backward.
+
+    ``stall_s``: for this time before the reset, the driver reads nothing.
     """
     bench = Bench(firmware, HOST_GAINS)
     board = bench.session.board
@@ -296,7 +299,8 @@ def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str) -> Non
     bench.run(3.0)
     assert all(8 <= wheel.ticks <= 18 for wheel in bench.board.wheels)
     sent = more = b""
-    while more or b":12ffffffff" not in sent:
+    stalled_until = bench.now + stall_s
+    while more or b":12ffffffff" not in sent or bench.now < stalled_until:
         bench.now += TICK_S
         more = b"".join(data for _, data in bench.robot.advance())
         sent += more
