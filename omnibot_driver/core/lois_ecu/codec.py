@@ -36,6 +36,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     GpsPosition,
     GpsTime,
     Heading,
+    LostRecord,
     Record,
     RecordHeading,
     RecordKind,
@@ -177,6 +178,8 @@ def encode_report(report: Report) -> bytes:
             return _group(code, [from_float(number) for number in numbers])
         case Record():
             return _encode_record(report)
+        case LostRecord():
+            raise FrameError("a lost record has no samples to send")
         case TerminalLine(text):
             return text.encode("latin-1") + b"\r\n"
 

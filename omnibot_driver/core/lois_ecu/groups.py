@@ -112,10 +112,10 @@ class Assembler:
         """Return the reports that ``line`` completes."""
         code, payload = line.command, line.payload
         if code in _LENGTHS:
-            self._record.cut_off()
+            found = self._cut_off(now)
             # If the time before the line is too long, the line may belong to the next group.
             late = now - self._at > self._late_s.get(code, LATE_S)
-            found: list[Timed] = self._end(now) if late else []
+            found += self._end(now) if late else []
             if payload == MARKER and not self._may_be_minus_one(code):
                 found += self._end(now)
                 self._begin(code, now)
@@ -124,7 +124,7 @@ class Assembler:
         found = self._end(now)
         if code in RECORD_CODES:
             return found + [(now, record) for record in self._record.add(code, payload)]
-        self._record.cut_off()
+        found += self._cut_off(now)
         self._astray = self._after_ticks = False
         report = single_report(line)
         if report is None:
@@ -144,9 +144,11 @@ class Assembler:
 
     def finish(self, now: float) -> list[Timed]:
         """Return the held group if it is complete. Called when the port closes."""
-        found = self._end(now)
-        self._record.cut_off()
-        return found
+        return self._end(now) + self._cut_off(now)
+
+    def _cut_off(self, now: float) -> list[Timed]:
+        """Discard an unfinished record, because another message came before its end."""
+        return [(now, self._record.drop())] if self._record.begun else []
 
     # Groups
 

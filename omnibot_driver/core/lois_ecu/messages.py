@@ -318,6 +318,16 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
+class LostRecord:
+    """A record that was discarded, because it was damaged or not requested.
+
+    ``lines``: number of its lines that arrived.
+    """
+
+    lines: int
+
+
+@dataclass(frozen=True, slots=True)
 class TerminalLine(Unstamped):
     """A line of text from a sensor, which the board passes on in a terminal mode."""
 
@@ -333,5 +343,6 @@ Report = (
     | Ticks
     | BoardOdometry
     | Record
+    | LostRecord
     | TerminalLine
 )

@@ -14,6 +14,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     HEADING_PADDING,
     RECORD_END,
     Code,
+    LostRecord,
     Record,
     RecordKind,
 )
@@ -41,7 +42,7 @@ class GroupStatistics:
 class RecordAssembler:
     """Assembler of the lines of a record.
 
-    Call ``add`` for each line of the record, ``cut_off`` for another message, and ``damage`` for
+    Call ``add`` for each line of the record, ``drop`` for another message, and ``damage`` for
     other characters.
     """
 
@@ -52,7 +53,7 @@ class RecordAssembler:
 
     def _begin(self, code: int | None) -> None:
         self._payloads: list[int] = []
-        self._code, self._damaged = code, False
+        self._code, self._damaged, self._lines = code, False, 0
 
     @property
     def begun(self) -> bool:
@@ -68,15 +69,11 @@ class RecordAssembler:
         """Mark the unfinished record as damaged: one of its lines may have been lost."""
         self._damaged = self.begun
 
-    def cut_off(self) -> None:
-        """Discard an unfinished record, because another message came before its end."""
-        if self.begun:
-            self._drop()
-
-    def add(self, code: int, payload: int) -> list[Record]:
-        """Add a line. Return a list with the record that the line completes, or an empty list."""
+    def add(self, code: int, payload: int) -> list[Record | LostRecord]:
+        """Add a line. Return a list with the record that the line ends, or an empty list."""
         if not self.begun:
             self._begin(code)
+        self._lines += 1
         self._damaged |= code != self._code
         if not self._ends(code, payload):
             if self._expected is None or len(self._payloads) >= max(self._expected[1:]):
@@ -86,8 +83,7 @@ class RecordAssembler:
             return []
         record = None if self._damaged else self._whole(code)
         if record is None:
-            self._drop()
-            return []
+            return [self.drop()]
         self._begin(None)
         self._expected = None
         return [record]
@@ -106,10 +102,13 @@ class RecordAssembler:
             return True
         return len(self._payloads) >= max(self._expected[1:])
 
-    def _drop(self) -> None:
+    def drop(self) -> LostRecord:
+        """Discard the unfinished record."""
         self._statistics.damaged_groups += 1
         self._statistics.damaged_records += 1
+        lost = LostRecord(self._lines)
         self._begin(None)
+        return lost
 
     def _whole(self, code: int) -> Record | None:
         if self._expected is None:

@@ -17,6 +17,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     GpsPosition,
     GpsTime,
     Heading,
+    LostRecord,
     Record,
     Report,
     TerminalLine,
@@ -167,9 +168,11 @@ class Translation:
             case EStopButton():
                 self.odometry.halted(now)
                 return [report]
-            case Record():
-                self._time.sent(report.lines)
+            case Record(lines=lines):
+                self._time.sent(lines)
                 return [report]
+            case LostRecord(lines):
+                self._time.sent(lines)
             case TerminalLine():
                 return [report]
         return []

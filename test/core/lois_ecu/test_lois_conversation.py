@@ -234,19 +234,23 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 
 
 @pytest.mark.slow
-def test_ticks_after_a_record_are_not_taken_for_late() -> None:
-    """The clock of the public firmware stops for 0.24 s while the board sends a record.
+@pytest.mark.parametrize(("loss", "outcome"), [(0.0, RecordReading), (0.004, RecordFailed)])
+def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
+    """The clock of the public firmware stops for 0.12 s while the board sends a record.
 
     The driver does not take the next ticks for late, so ``odom`` has no jump some seconds later.
+    This is also true if lines of the record are lost.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)
-    rig.order(20, 20, 5.0)
-    rig.driver.record(RecordKind.RPM, 200)
-    while not [reading for reading in rig.readings if isinstance(reading, RecordReading)]:
-        rig.order(20, 20, 0.05)
+    rig.order(40, 40, 2.0)
+    rig.driver.record(RecordKind.RPM, 100)
+    while not [reading for reading in rig.readings if isinstance(reading, outcome)]:
+        rig._loss = loss * rig.driver._decoder.in_record
+        rig.order(40, 40, 0.05)
+    rig._loss = 0.0
     seen = len(rig.estimates)
-    rig.order(20, 20, 3.0)
+    rig.order(40, 40, 3.0)
     errors_m = [fused.pose.way_to(true).x_m for fused, true in rig.estimates[seen:]]
     assert max(errors_m) - min(errors_m) < 0.03
 

@@ -17,6 +17,7 @@ from omnibot_driver.core.lois_ecu import (
     GpsPosition,
     Heading,
     LoisDecoder,
+    LostRecord,
     Record,
     RecordKind,
     TerminalLine,
@@ -203,12 +204,13 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """A record that was not requested is discarded.
+    """A record that was not requested is discarded. The decoder returns its number of lines.
 
     Without a request, the decoder cannot detect that lines of a record are lost.
     """
     decoder = LoisDecoder()
-    assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
+    record = encode_report(Record(RecordKind.RPM, (11, 12), (13, 14)))
+    assert decoder.feed(record, 0.0) == [LostRecord(3)]
     assert decoder.group_statistics.damaged_groups == 1
 
 
