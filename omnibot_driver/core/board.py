@@ -251,8 +251,15 @@ class Board(Protocol):
         return NO_PACKETS
 
     def reset(self) -> Packets:
-        """Return the packets that reboot the board. The mode is then unknown until data arrives."""
+        """Return the packets that reboot the board. The mode is then unknown until data arrives.
+
+        The driver calls this method again if the board does not obey.
+        """
         return NO_PACKETS
+
+    def reset_given_up(self) -> None:
+        """Record that the driver has given up the reset, so ``due`` must not repeat it."""
+        return
 
     def stop(self) -> Packets:
         """Return the packets that stop the robot. The packets can depend on the robot's motion."""

@@ -314,6 +314,7 @@ class ModeManager:
             )
         if self.phase is Phase.RESETTING:
             self.phase = Phase.SETTLED
+            self._board.reset_given_up()
             if self._wanted is Wanted.PAUSED:
                 self._begin_pausing(now, with_p=True)
             elif self._wanted is Wanted.RUNNING and not mode.running:

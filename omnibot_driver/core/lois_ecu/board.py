@@ -40,9 +40,10 @@ from omnibot_driver.core.readings import (
 )
 
 RESETS: Final = 8
-RESET_AGAIN_S: Final = 0.9
+RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four tick
-reports have arrived."""
+reports have arrived. The last repetition comes less than ``UNPROVED_S`` before the driver gives the
+reset up. So small counts that never change are not accepted after it."""
 STEADY_S: Final = 0.3
 """Time in s. If the tick counts have not changed for this time, the wheels are regarded as at rest.
 The time is longer than the usual period of the tick reports."""
@@ -251,7 +252,7 @@ class LoisEcuBoard(Board):
     def _heard(self, packets: Packets, now: float) -> None:
         self._ecu.wrote(joined(packets), now)
         if self._ecu.driving:
-            self._reset_proof, self._reset_at_s = None, math.inf
+            self.reset_given_up()
         elif self._resets_left == RESETS:
             self._say_reset_again(now)
 
@@ -292,15 +293,20 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and the reset command.
+        """Return Stop and the reset command. Return nothing while ``due`` repeats them.
 
-        ``due`` repeats both until the ticks show the reset or the robot drives. In total, both are
-        sent at most ``RESETS`` times.
+        ``due`` repeats both until the ticks show the reset, the driver gives it up, or the robot
+        drives. In total, both are sent at most ``RESETS`` times.
         """
-        if self._reset_shown:
-            self._reset_proof = None  # a new reset needs a proof of its own
+        if self._reset_proof is not None and not (self._reset_shown or self._leaving):
+            return NO_PACKETS
+        self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False
         return self._reset()
+
+    def reset_given_up(self) -> None:
+        """Record that the driver has given up the reset, so ``due`` must not repeat it."""
+        self._reset_proof, self._reset_at_s = None, math.inf
 
     def _reset(self) -> Packets:
         known = self._ecu.translation

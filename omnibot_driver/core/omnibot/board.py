@@ -264,6 +264,9 @@ class OmniBot:
         self._translation.apply(Happening.SENT_RESET)
         return packed(transmission(frames.encode(frames.STOP), frames.RESET))
 
+    def reset_given_up(self) -> None:
+        """Do nothing, because ``due`` does not repeat a reset."""
+
     def stop(self) -> Packets:
         """Return the manual's Stop, which works in both positions of the board's control switch."""
         return self._encoder.stop()

@@ -146,6 +146,32 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 
 @pytest.mark.slow
+def test_a_reset_is_not_repeated_after_the_answer_that_it_failed() -> None:
+    """The cable to the board is broken, so the board does not obey a reset, but its ticks arrive.
+
+    The driver sends the reset at most eight times, and not after its answer. When the cable is
+    repaired, the next request succeeds.
+    """
+    bench = Bench("documented")
+    bench.drive_on(0.2, 1.2)
+    bench.run(2.0)
+    bench.hears = False
+    bench.written.clear()
+    assert not bench.reset().success
+    assert 2 <= resets_in(bench) <= 8
+    bench.written.clear()
+    bench.run(2.0)
+    assert resets_in(bench) == 0
+    bench.hears = True
+    assert bench.reset().message == "the board was reset"
+
+
+def resets_in(bench: Bench) -> int:
+    """Return how many resets the driver has written."""
+    return b"".join(data for _, data in bench.written).count(b":18")
+
+
+@pytest.mark.slow
 @FIRMWARE
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
     """The counters are still zero after a first reset. A second reset is lost.
