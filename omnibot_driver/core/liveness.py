@@ -45,6 +45,10 @@ class Liveness:
         """Return whether the board has been silent so long that the robot must be stopped."""
         return now - self.heard_at >= self.unheard_s
 
+    def is_silent(self, now: float) -> bool:
+        """Return whether no data came for ``Traits.silence_s``, or none since the port opened."""
+        return self.came_at == -math.inf or now - self.heard_at >= self.silence_s
+
     def fell_silent(self, now: float) -> bool:
         """Return True once for each silence of the board, after ``Traits.silence_s``."""
         if self._silent_since == self.heard_at or now - self.heard_at < self.silence_s:

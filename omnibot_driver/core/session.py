@@ -277,7 +277,7 @@ class Session:
         silent or the port is closed.
         """
         self.inbound.process(now)
-        if reason := self.interlocks.why_not_reset_odometry():
+        if reason := self.interlocks.why_not_reset_odometry(now):
             raise RequestRefused(f"odometry not reset: {reason}")
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()

@@ -82,7 +82,7 @@ class Interlocks:
             return refusal
         return tripped
 
-    def why_not_reset_odometry(self) -> str:
+    def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
         While the board is silent, the robot's place is unknown. Later data would add motion from
@@ -90,7 +90,7 @@ class Interlocks:
         """
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN
-        return (self.missing or NO_VALID_DATA) if self._board.mode is Mode.UNKNOWN else ""
+        return NO_VALID_DATA if self._liveness.is_silent(now) else ""
 
     def why_not_task(self) -> str:
         """Return the reason why a task, such as a recording, cannot begin; empty if it can."""
