@@ -95,9 +95,9 @@ class Upkeep:
     @property
     def wake_at(self) -> float:
         """Time in s at which to call ``due`` next."""
-        if self._leaving:
-            return self.machine.wake_at
         times = [self.jobs.wake_at, self.machine.wake_at]
+        if self._leaving:
+            return min(times)
         for half in self._ports.halves:
             times.append(half.wake_at)
             if half.role is not None and half.ready:
@@ -107,10 +107,10 @@ class Upkeep:
     def due(self, now: float, *, stands: bool) -> Packets:
         """Return the packets to send now; ``stands``: whether no motion is commanded."""
         packets = self._ports.ending("front", *self.machine.due(now))
-        if self._leaving:
-            return packets
         for role, texts in self.jobs.due(now).items():
             packets += self._ports.line(role, *texts)
+        if self._leaving:
+            return packets
         for channel, half in enumerate(self._ports.halves):
             packets += self._ports.at(channel, *self._of_half(half, now, stands=stands))
         return packets
