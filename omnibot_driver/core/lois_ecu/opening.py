@@ -73,7 +73,7 @@ class SettingsWriter:
         self._round_at_s = math.inf
         self._date_asked_at_s, self._dates_asked = -math.inf, 0
         self._arrivals: deque[float] = deque(maxlen=6)
-        self._rounds = 0
+        self._rounds = self._repeated = 0
         self.overwritten = False
         """Whether the terminal mode was written, which overwrites "left short correction"."""
 
@@ -91,7 +91,7 @@ class SettingsWriter:
     def ignored(self) -> bool:
         """Whether the board seems to ignore the settings: they were sent in twice the usual number
         of rounds, and it has not confirmed them."""
-        return self._rounds >= 2 * ROUNDS and not self.confirmed
+        return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
 
     @property
     def wake_at(self) -> float:
@@ -122,7 +122,7 @@ class SettingsWriter:
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now
-        self._rounds = 0
+        self._rounds = self._repeated = 0
         self._in_period = self._answered = False
 
     def repeat(self, now: float) -> None:
@@ -132,6 +132,7 @@ class SettingsWriter:
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
+            self._repeated += ROUNDS
 
     def write(self, command: Command, now: float) -> None:
         """Queue a command that is not a setting, to be sent ``ROUNDS`` times.
@@ -167,7 +168,8 @@ class SettingsWriter:
         steps = [after - before for before, after in pairwise(self._arrivals)]
         wanted_s = median(steps) if wanted is None else wanted / 1000
         self._in_period = abs(median(steps) - wanted_s) <= CONFIRMED_WITHIN * wanted_s
-        if not self.confirmed and self.done and self._rounds < MOST_ROUNDS:
+        tried = self._rounds - self._repeated
+        if not self.confirmed and self.done and tried < MOST_ROUNDS:
             away_s = AWAY_S[self._rounds % len(AWAY_S)]
             self._rounds_left, self._round_at_s = 1, now + away_s
 
@@ -197,8 +199,11 @@ class SettingsWriter:
         self._rounds_left -= 1
         self._rounds += 1
         self._round_at_s = max(now, self._round_at_s) + ROUND_S
-        for index, command in enumerate(self._turned(self._rounds)):
-            self._queue.append((now + index * LINE_S, command))
+        at_s = now
+        for command in self._turned(self._rounds):
+            self._queue.append((at_s, command))
+            at_s += LINE_S
+        self._round_at_s = max(self._round_at_s, at_s)
 
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round. Each round begins with a different command.

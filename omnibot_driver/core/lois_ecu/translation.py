@@ -135,7 +135,9 @@ class Translation:
         match report:
             case Ticks():
                 if self._was_reset(report, read_s):
+                    until_s = self._reset_until_s
                     self.connect()
+                    self._reset_until_s = until_s
                 restarted = self._watch(report, clock_unit, now)
                 self._late_s = self._time.late_s(report.time_counts, self._unit, now)
                 odometry.estimates.late_stddev_s = self._time.stddev_s

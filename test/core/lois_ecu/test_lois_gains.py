@@ -76,6 +76,21 @@ def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None
     assert right.td == pytest.approx(HOST_GAINS.written[Setting.RIGHT_TD])
 
 
+def test_no_line_follows_the_request_for_a_date_directly() -> None:
+    """The next round begins at least 20 ms later, so the board can answer before."""
+    writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
+    writer.begin(0.0)
+    sent: list[tuple[float, bytes]] = []
+    now = 0.0
+    while not writer.done:
+        now = max(now, writer.wake_at)
+        sent.append((now, writer.due(now)))
+    asked = [index for index, (_, data) in enumerate(sent) if data.startswith(b":0f0000fffe")]
+    assert len(asked) == ROUNDS
+    assert all(sent[index + 1][0] - sent[index][0] >= 0.0199 for index in asked[:-1])
+    assert all(len(data) == 14 for _, data in sent)
+
+
 @pytest.mark.slow
 def test_a_wheel_that_does_not_start_gets_its_settings_again_at_rest() -> None:
     """The board lost the low-pass, so the wheels do not turn. The next drive moves the robot."""
