@@ -48,8 +48,17 @@ def off_by_m(bench: Bench) -> float:
 
 
 @pytest.mark.slow
-@EVERY_PERIOD
-@pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
+@pytest.mark.parametrize(
+    ("period_s", "frame"),
+    [
+        *((period_s, "earth") for period_s in DELTA_PERIODS_S),
+        *(
+            (period_s, frame)
+            for period_s in (min(DELTA_PERIODS_S), max(DELTA_PERIODS_S))
+            for frame in ("body", "wheel_counts")
+        ),
+    ],
+)
 def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str) -> None:
     """The robot drives at 0.3 m/s, -0.1 m/s and 0.4 rad/s. The driver publishes the right values.
 
@@ -143,14 +152,14 @@ def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
+@pytest.mark.parametrize("lost", [1, 2, 3, 9, 10, 11, 30, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
     """Deltas come at 10 Hz, and up to 300 are lost. SEQ wraps in the longest gap.
 
     1.2 s after the gap, odom is right within 3 mm and 3 mrad.
     """
-    for seed in range(3 if lost < 30 else 2):
+    for seed in range(3 if lost < 30 else 1):
         on = Line(
             BoardSettings(running=True, delta_period_s=TEN_HZ_S, frame=frame, seed=seed), seed=seed
         )

@@ -27,15 +27,18 @@ def last_count(bench: Bench) -> int:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("stall_s", "kept", "yaw_rates"),
+    ("stall_s", "kept", "yaw_rates", "count", "turns"),
     [
-        (6.0, READ, (0.0, 0.5)),
-        (11.0, READ, (0.5, 0.0)),
-        (10.0, 3 * READ, (0.5, 0.0)),
-        (15.0, 3 * READ, (0.0, 0.5)),
+        (*stall, count, turns)
+        for *stall, large in [
+            (6.0, READ, (0.0, 0.5), (254, 0)),
+            (11.0, READ, (0.5, 0.0), (60, 1)),
+            (10.0, 3 * READ, (0.5, 0.0), (200, 0)),
+            (15.0, 3 * READ, (0.0, 0.5), (60, 1)),
+        ]
+        for count, turns in [(0, 1), (3, 0), large]
     ],
 )
-@pytest.mark.parametrize(("count", "turns"), [(254, 0), (0, 1), (3, 0), (60, 1), (200, 0)])
 def test_motion_that_the_full_buffer_lost_is_in_odom_whatever_the_counter_shows(
     stall_s: float, kept: int, yaw_rates: tuple[float, float], count: int, turns: int
 ) -> None:

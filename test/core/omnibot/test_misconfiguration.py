@@ -92,7 +92,7 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
-@pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
+@pytest.mark.parametrize("lose", [0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
     """The line loses bytes, so fewer IMU frames than usual come between two deltas.
 
