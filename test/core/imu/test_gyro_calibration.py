@@ -80,6 +80,7 @@ def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(biases, st.integers(0, 2**16))
 def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
     """A calibration uses 2 s of noisy readings at rest.
@@ -187,7 +188,7 @@ def test_a_measurement_that_is_given_up_says_why_once() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(biases)
 def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
     """At rest, the bias approaches the true one by a twentieth of the difference per second."""

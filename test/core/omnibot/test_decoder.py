@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 from frame_strategies import believable_frames, frames
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from strategies import chunkings, cut
 from streams import (
@@ -57,12 +57,13 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
     stream = b"".join(ticks_of(name))
     sent = [frame for _, frame in frames_of(stream)]
     random = Random(11)
-    for mean_length in (1.5, 3, 7, 14, 40, 200) * 2:
+    for mean_length in (1.5, 3, 7, 14, 40, 200):
         cuts = sorted(random.sample(range(len(stream)), int(len(stream) / mean_length)))
         assert decoded(cut(stream, cuts), step_s=1e-3) == sent
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(st.lists(believable_frames, max_size=25), st.data())
 def test_in_step_any_content_is_delivered_in_any_chunks(
     sent: list[Frame], data: st.DataObject
@@ -174,11 +175,14 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """Decoding starts at any of the first 345 bytes. All frames but at most two are returned."""
+    """Decoding starts at any of the first 345 bytes. All frames but at most two are returned.
+
+    If the bytes come in ticks or one by one, it starts at some of them only.
+    """
     ticks = ticks_of(name)[:40]
     stream = b"".join(ticks)
     sent = frames_of(stream)
-    for start in range(0, 345, {"whole": 1, "ticks": 3, "bytes": 11}[by]):
+    for start in range(0, 345, {"whole": 1, "ticks": 9, "bytes": 23}[by]):
         expected = [frame for at, frame in sent if at >= start]
         if by == "whole":
             found = decoded([stream[start:]])
@@ -259,6 +263,7 @@ def test_an_undamaged_stream_has_no_faults(name: str) -> None:
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(st.lists(st.one_of(frames.map(encode), st.binary(max_size=20)), max_size=20))
 @example([LEAD_IN, b"\x00", LEAD_IN])
 def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> None:

@@ -42,6 +42,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(any_streams, st.data())
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
@@ -61,6 +62,7 @@ def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(st.lists(st.lists(st.one_of(believable_frames, paused_frames), max_size=6)), st.data())
 def test_all_frames_between_silences_come_in_any_chunks(
     bursts: list[list[Frame]], data: st.DataObject
@@ -80,6 +82,7 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
     """Calm frames come: the content of each fits that of the frame before it.
@@ -169,7 +172,7 @@ def work(
         (name, *chunks)
         for name in ADVERSARIES
         for chunks in [(1, 0), (1, 0.005), (13, 0), (1_000_000, 0)]
-        if chunks != (1, 0.005) or name not in ("FF FA", "FF FB")  # "all headers" contains these
+        if chunks != (1, 0.005) or name not in ("FF FA", "FF FB", "FF FC")  # in "all headers"
     ],
 )
 def test_work_is_linear_and_memory_bounded(

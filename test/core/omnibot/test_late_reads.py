@@ -10,7 +10,7 @@ from itertools import takewhile
 
 import pytest
 from frame_strategies import triples
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from streams import BYTE_S, LEAD_IN, REST, RUNNING_STREAMS, TICK_S, frames_of, ticks_of
 
@@ -20,7 +20,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 Read = tuple[bytes, float]
 Reads = Iterator[Read]
 
-STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
+STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 20e-3, 0.1, 0.3)
 """Times in s for which a reader stops.
 
 Some are close to the idle time between two ticks, 8.8 ms, or to a tick, 10 ms.
@@ -93,14 +93,14 @@ def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """A reader reads promptly for 0.5 s. Then it stops once, between any two bytes of five frames.
+    """A reader reads promptly for 0.5 s. Then it stops once, in one of five frames.
 
-    No frame is lost.
+    It stops between two bytes, at any place in a frame. No frame is lost.
     """
-    ticks = ticks_of(name)[: 68 + round(stop_s / TICK_S)]
+    ticks = ticks_of(name)[: 62 + round(stop_s / TICK_S)]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
-    places = range(begin, begin + 5 * 14, 1 if stop_s == 5e-3 else 9)
+    places = range(begin, begin + 5 * 14, 3 if stop_s == 5e-3 else 9)
     found = heard_each([stopped(ticks, place, stop_s) for place in places])
     assert [place for place, frames in zip(places, found, strict=True) if frames != sent] == []
 
@@ -114,10 +114,10 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
     No frame is lost.
     """
     for stop_s in STOPS_S:
-        ticks = ticks_of("driving")[: 68 + round(stop_s / TICK_S)]
+        ticks = ticks_of("driving")[: 62 + round(stop_s / TICK_S)]
         sent = [frame for _, frame in frames_of(b"".join(ticks))]
         begin = len(b"".join(ticks[:50]))
-        places = range(begin, begin + 4 * 14, 5)
+        places = range(begin, begin + 4 * 14, 11)
         found = heard_each(
             [stopped(ticks, place, stop_s, most=most, piece=piece) for place in places]
         )
@@ -126,6 +126,7 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(
     st.lists(st.tuples(triples, triples, st.booleans()), min_size=4, max_size=12),
     st.lists(st.floats(0.0, 0.03), min_size=1, max_size=12),

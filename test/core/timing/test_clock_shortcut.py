@@ -56,7 +56,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
     """The stamps are equal with and without the shortcut, even if frames are lost."""
-    reads = heard(Board(seconds=12, skew=1e-4, loss=loss), chunker, 1)
+    reads = heard(Board(seconds=7, skew=1e-4, loss=loss), chunker, 1)
     assert stamped(reads, quick=True) == stamped(reads, quick=False)
 
 
@@ -87,7 +87,7 @@ normal reads that follow).
 
 
 @pytest.mark.slow
-@settings(max_examples=200)
+@settings(max_examples=60)
 @given(st.lists(surprises, max_size=30), st.floats(0.0, 0.004))
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
