@@ -26,7 +26,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", [False, True])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 3, 5])
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
     """The board is paused during a drive, and the robot rolls until it stands.
 
@@ -46,7 +46,7 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 3, 5])
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
     """The board restarts, so SEQ and its pose begin at zero.
 

@@ -78,18 +78,17 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
     assert not bench.robot.stands
 
 
-@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
-def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) -> None:
-    """On a network with late replies, two headings are often equal by chance.
+@pytest.mark.parametrize(("firmware", "seed"), [("firmware", 5), ("source", 14)])
+def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, seed: int) -> None:
+    """Replies are late. In each of these drives, two headings in a row are equal by chance.
 
     Only three equal headings show a dead IMU, so the driver does not report a dead IMU.
     """
-    for seed in (5, 12, 14):
-        bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
-        for _ in range(3):
-            bench.command(-0.2, 0.0, 6.0)
-            bench.command(0.3, 0.0, 6.0)
-        assert not any("IMU" in each for each in texts(bench))
+    bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
+    for _ in range(3):
+        bench.command(-0.2, 0.0, 6.0)
+        bench.command(0.3, 0.0, 6.0)
+    assert not any("IMU" in each for each in texts(bench))
 
 
 def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:

@@ -46,7 +46,7 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
 
     The driver does not report that the robot stands still, or that the IMU is dead.
     """
-    for seed in range(3):
+    for seed in range(2):
         bench = MartBench(firmware, NetworkFaults(lose=0.03), seed=seed, motor_lag_s=0.1).ready()
         for _ in range(6):
             bench.command(0.3, 0.1, 1.2)
@@ -57,8 +57,10 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.parametrize("before", [(-0.3, 0.0), (0.4, 0.0), (0.0, 0.5)])
+@pytest.mark.parametrize(
+    ("before", "firmware"),
+    list(zip([(-0.3, 0.0), (0.4, 0.0), (0.0, 0.5)], FIRMWARES, strict=True)),
+)
 def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
     before: tuple[float, float], firmware: Firmware
 ) -> None:
@@ -159,17 +161,16 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     """The wheels of a heavy robot turn for 1.3 s after a stop.
 
     The server waits 0.6 s for them, and reports a failure. The driver does not report that the
-    robot moves without a command.
+    robot moves without a command. Every other stop is an e-stop.
     """
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
-    for twist in ((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9)):
-        for latched in (False, True):
-            bench.command(*twist, 2.0)
-            if latched:
-                bench.estop(True)
-            bench.run(2.5)
-            bench.estop(False)
-            bench.run(0.5)
+    for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):
+        bench.command(*twist, 2.0)
+        if (number + FIRMWARES.index(firmware)) % 2:
+            bench.estop(True)
+        bench.run(2.5)
+        bench.estop(False)
+        bench.run(0.5)
     assert not any("robot moves" in notice for notice in bench.notices), bench.notices
 
 

@@ -19,8 +19,7 @@ from omnibot_driver.simulator.mart import Firmware
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(("seed", "firmware"), list(enumerate(EVERY_FIRMWARE)))
 def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
     seed: int, firmware: Firmware
 ) -> None:

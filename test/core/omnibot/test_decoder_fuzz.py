@@ -198,7 +198,7 @@ def test_work_is_linear_and_memory_bounded(
 
 @pytest.mark.slow
 @given(st.binary(min_size=1, max_size=40), st.sampled_from([1, 5, 13, 62, 4096]))
-@settings(max_examples=40)
+@settings(max_examples=20)
 @example(b"\xff\xfb\xff\xfa", 1)
 def test_no_repeated_pattern_costs_much_more_than_another(
     pattern: bytes, chunk_length: int

@@ -346,7 +346,7 @@ Only deltas and poses are counted.
 
 @pytest.mark.slow
 @given(losses, st.integers(0, 3), st.sampled_from(["earth", "body"]))
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:

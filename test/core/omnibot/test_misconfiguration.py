@@ -26,7 +26,7 @@ from omnibot_driver.simulator.omnibot import (
 
 DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
 """Command for 0.3 m/s forward, 0.2 m/s to the left and 0.4 rad/s."""
-LONG_S = 20.0
+LONG_S = 12.0
 
 
 @cache
