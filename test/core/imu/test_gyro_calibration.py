@@ -68,6 +68,7 @@ def answer(calibration: GyroCalibration) -> RequestDone:
     return only
 
 
+@settings(max_examples=40)
 @given(st.lists(vectors, min_size=1, max_size=30))
 def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
     """Mean and standard deviation are those of the textbook's formulas, for each axis."""

@@ -5,7 +5,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.imu.scale import ImuScale, gravity_advice
@@ -41,6 +41,7 @@ def test_two_g_and_250_degrees_a_second_are_the_default() -> None:
     assert ImuScale().angular_velocity((131, 0, 0))[0] == pytest.approx(math.radians(1.0))
 
 
+@settings(max_examples=40)
 @given(triples)
 def test_axes_stay_the_sensors_own(counts: Triple) -> None:
     """The conversion of counts to SI units does not turn, swap or shift the axes."""

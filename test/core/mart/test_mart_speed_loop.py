@@ -5,7 +5,7 @@
 from random import Random
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.mart import MartSettings
@@ -91,6 +91,7 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 
 
 @pytest.mark.slow
+@settings(max_examples=25)
 @given(SLOPES, DEAD, st.integers(0, 1000))
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int

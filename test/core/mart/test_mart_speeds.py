@@ -45,7 +45,7 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     for vx, yaw_rate in STEPS:
         if firmware == "documented" and not vx:
             continue  # without SSP a turn on the spot has one speed
-        speed, rate = driven(bench, vx, yaw_rate, samples=20)
+        speed, rate = driven(bench, vx, yaw_rate, samples=10)
         assert speed == pytest.approx(vx, rel=0.05, abs=0.004), (vx, yaw_rate)
         assert rate == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
     assert bench.notices == []

@@ -5,7 +5,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lossy_odometry import Line
 from strategies import axis_signs, small_moves
@@ -34,6 +34,7 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(axis_signs, st.lists(small_moves, min_size=1, max_size=20), st.sampled_from("eb"))
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
@@ -69,6 +70,7 @@ def test_wheels_from_the_bodys_displacements_and_back(
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(st.lists(st.tuples(*[st.integers(-300, 300)] * 3), min_size=1, max_size=20))
 def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int, int]]) -> None:
     """Wheel counts are converted to motions of the body and back to wheel angles.

@@ -194,7 +194,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 
 
 @pytest.mark.slow
-@settings(suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
     """Apart from rounding, the velocity that is computed back from a frame is the commanded one.

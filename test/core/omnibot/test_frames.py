@@ -16,7 +16,7 @@ from frame_strategies import (
     pose_frames,
     triples,
 )
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import FrameError
@@ -164,6 +164,7 @@ def test_encoding_undoes_decoding(frame: Frame | CommandFrame, order: ByteOrder)
     assert encode(decode(data, order), order) == data
 
 
+@settings(max_examples=40)
 @given(triples, triples, counters, floats32, floats32, floats32, byte_orders)
 def test_the_simulated_board_speaks_the_same_language(
     a: tuple[int, int, int],
@@ -181,6 +182,7 @@ def test_the_simulated_board_speaks_the_same_language(
     assert decode(wire.paused_text(seq)) == PausedFrame(seq)
 
 
+@settings(max_examples=40)
 @given(commands)
 def test_the_simulated_board_understands_every_command(command: CommandFrame) -> None:
     """The receiver of the simulated board reads every command as the driver has encoded it."""
