@@ -207,7 +207,7 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
     The robot drives at 0.5 m/s at most, plus 5 % for the measurement.
     """
-    bench.drive_on(100.0, 2.0)
+    bench.drive_on(100.0, 1.0)
     before = bench.robot.way_m
     bench.drive_on(100.0, 2.0)
     assert bench.robot.way_m - before < 1.05
