@@ -9,8 +9,9 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 from probe import Probe, ros
+from std_srvs.srv import SetBool
 
 from omnibot_driver.shared_session import WAITED
 
@@ -80,6 +81,37 @@ def probe(driver: Driver, probe_of: Callable[[Driver], Probe]) -> Probe:
     probe = probe_of(driver)
     probe.wait_for_state("nominal")
     return probe
+
+
+@pytest.fixture(scope="module")
+def shared(_ros: None) -> Iterator[tuple["PtyBoard", Driver]]:
+    """A board and its driver, which several tests of a module use."""
+    from omnibot_driver.simulator.omnibot import PtyBoard, SimulatedBoard
+
+    with PtyBoard(SimulatedBoard()) as board, Driver(port=board.path) as driver:
+        yield board, driver
+
+
+@pytest.fixture
+def shared_probe(
+    shared: tuple["PtyBoard", Driver], probe_of: Callable[[Driver], Probe]
+) -> Iterator[Probe]:
+    """A probe of the shared driver. Before and after the test, the robot is at rest.
+
+    The e-stop is not latched. The lists of the commands and of the driver's output are empty.
+    """
+    board, driver = shared
+    probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    for data in (True, False):  # this discards the command of the test before
+        assert probe.call(SetBool, "estop", data=data).success
+    assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
+    with board.lock:
+        board.board.commands.clear()
+    driver.lines.clear()
+    yield probe
+    if driver.process.poll() is None:
+        probe.call(SetBool, "estop", data=True)
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ The driver obeys or refuses them.
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,34 @@ from omnibot_driver.shared_session import WAITED
 from omnibot_driver.simulator.omnibot import BoardPose, PtyBoard, ReceivedCommand, SimulatedBoard
 
 Start = Callable[..., Any]
+
+
+@pytest.fixture
+def board(shared: tuple[PtyBoard, Driver]) -> PtyBoard:
+    return shared[0]
+
+
+@pytest.fixture
+def driver(shared: tuple[PtyBoard, Driver]) -> Driver:
+    return shared[1]
+
+
+@pytest.fixture
+def probe(shared_probe: Probe) -> Probe:
+    return shared_probe
+
+
+@contextmanager
+def repeated(probe: Probe, publisher: Any, message: object) -> Iterator[None]:
+    """Publish a message at 5 Hz while the context lasts.
+
+    The driver logs a kind of refusal at most once in 2 s, and another test may have caused one.
+    """
+    timer = probe.node.create_timer(0.2, lambda: publisher.publish(message))
+    try:
+        yield
+    finally:
+        probe.remove(timer)
 
 
 def obeyed(board: SimulatedBoard, kind: str, *values: int) -> bool:
@@ -111,12 +140,13 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 
 
 def test_a_zero_twist_is_the_stop_frame(
-    board: PtyBoard, start_driver: Start, probe_of: Start
+    start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
     """A zero Twist arrives while the robot drives. The driver sends the Stop frame at once.
 
     It never sends a velocity frame with zeros.
     """
+    board: PtyBoard = start_board()
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
     commands = probe.publisher(Twist, "cmd_vel")
@@ -156,8 +186,8 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     The next correct one is obeyed.
     """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
-    commands.publish(Float32MultiArray(data=data))
-    driver.wait_for_line(f"wheel_cmd rejected.*{reason}")
+    with repeated(probe, commands, Float32MultiArray(data=data)):
+        driver.wait_for_line(f"wheel_cmd rejected.*{reason}")
     commands.publish(Float32MultiArray(data=[10.0, 0.0, 0.0]))
     assert board.wait_for(lambda b: obeyed(b, "wheels", 20, 0, 0), PATIENCE_S)
 
@@ -171,8 +201,8 @@ def test_a_twist_that_is_not_finite_anywhere_is_refused(
     twist = Twist()
     twist.linear.y = 0.3
     setattr(twist.linear, axis, bad)
-    commands.publish(twist)
-    driver.wait_for_line("cmd_vel rejected.*NaN or infinity")
+    with repeated(probe, commands, twist):
+        driver.wait_for_line("cmd_vel rejected.*NaN or infinity")
     with board.lock:
         assert not any(command.kind == "velocity" for command in board.board.commands)
 
@@ -210,9 +240,10 @@ def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoar
 
 
 def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
-    board: PtyBoard, start_driver: Start, probe_of: Start
+    start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
     """With ``enable_stamped_cmd_vel`` the type of cmd_vel is geometry_msgs/TwistStamped."""
+    board: PtyBoard = start_board()
     stamps = {"enable_stamped_cmd_vel": True, "cmd_vel_timeout": 10.0}
     probe: Probe = probe_of(start_driver(board.path, **stamps))
     probe.wait_for_state("nominal")
@@ -225,12 +256,13 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
 
 
 def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
-    board: PtyBoard, start_driver: Start, probe_of: Start
+    start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
     """A stamped command is older than ``cmd_vel_timeout``. The driver refuses it.
 
     A command whose stamp is zero is obeyed, because zero is not a time.
     """
+    board: PtyBoard = start_board()
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")

@@ -20,6 +20,21 @@ from omnibot_driver.simulator.omnibot import BoardMode, PtyBoard, SimulatedBoard
 Start = Callable[..., Any]
 
 
+@pytest.fixture
+def board(shared: tuple[PtyBoard, Driver]) -> PtyBoard:
+    return shared[0]
+
+
+@pytest.fixture
+def driver(shared: tuple[PtyBoard, Driver]) -> Driver:
+    return shared[1]
+
+
+@pytest.fixture
+def probe(shared_probe: Probe) -> Probe:
+    return shared_probe
+
+
 def kinds(board: PtyBoard) -> list[str]:
     with board.lock:
         return [command.kind for command in board.board.commands]
@@ -278,9 +293,8 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
     probe.wait_for(lambda: any(one.pose.pose.position.x < 0.05 for one in odometry[before:]))
 
 
-@pytest.mark.parametrize(("kind", "service"), [(Trigger, "start"), (SetBool, "pause")])
 def test_services_answer_with_a_reason_when_the_board_is_silent(
-    start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
+    start_driver: Start, probe_of: Start, silent_port: str
 ) -> None:
     """The board is silent.
 
@@ -289,9 +303,10 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("connecting")
-    answer = probe.call(kind, service)
-    assert not answer.success
-    assert "power" in answer.message
+    for kind, service in ((Trigger, "start"), (SetBool, "pause")):
+        answer = probe.call(kind, service)
+        assert not answer.success
+        assert "power" in answer.message
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:

@@ -22,6 +22,21 @@ from omnibot_driver.simulator.omnibot import BoardPose, PtyBoard
 Start = Callable[..., Any]
 
 
+@pytest.fixture
+def board(shared: tuple[PtyBoard, Driver]) -> PtyBoard:
+    return shared[0]
+
+
+@pytest.fixture
+def driver(shared: tuple[PtyBoard, Driver]) -> Driver:
+    return shared[1]
+
+
+@pytest.fixture
+def probe(shared_probe: Probe) -> Probe:
+    return shared_probe
+
+
 def stamp_s(message: Any) -> float:
     stamp = message.header.stamp
     return float(stamp.sec + stamp.nanosec * 1e-9)

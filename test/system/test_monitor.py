@@ -22,6 +22,21 @@ from omnibot_driver.tools.monitor.__main__ import main
 from omnibot_driver.tools.monitor.teleop import ZEROS
 
 
+@pytest.fixture
+def board(shared: tuple[PtyBoard, Driver]) -> PtyBoard:
+    return shared[0]
+
+
+@pytest.fixture
+def driver(shared: tuple[PtyBoard, Driver]) -> Driver:
+    return shared[1]
+
+
+@pytest.fixture
+def probe(shared_probe: Probe) -> Probe:
+    return shared_probe
+
+
 def newest(board: SimulatedBoard) -> tuple[str, tuple[int, ...]]:
     return (board.commands[-1].kind, board.commands[-1].values) if board.commands else ("", ())
 
@@ -148,13 +163,12 @@ def test_who_lets_go_of_the_key_stops_the_robot(
 
 
 def test_the_speeds_of_the_keys_are_tenths_of_the_drivers_limit(
-    board: PtyBoard,
     start_driver: Callable[..., Driver],
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
     """The driver has a lower limit than its default. The monitor begins with three tenths of it."""
-    driver = start_driver(board.path, max_linear_speed=0.4)
+    driver = start_driver("sim://", max_linear_speed=0.4)
     probe_of(driver).wait_for_state("nominal")
     terminal = monitor_of(driver, "--teleop")
     terminal.wait_for("0.12 m/s")
@@ -163,7 +177,7 @@ def test_the_speeds_of_the_keys_are_tenths_of_the_drivers_limit(
 
 
 def test_a_monitor_that_is_ended_stops_what_it_steered(
-    board: PtyBoard,
+    start_board: Callable[..., PtyBoard],
     start_driver: Callable[..., Driver],
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
@@ -172,6 +186,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 
     The monitor stops the robot. In this test, the monitor sends stamped commands.
     """
+    board = start_board()
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
 
