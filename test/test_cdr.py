@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from geometry_msgs.msg import Quaternion, Twist, Vector3
 from hypothesis import given
+from hypothesis import settings as limits
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
@@ -72,6 +73,7 @@ def padded(data: bytes, like: bytes) -> bytes:
     return bytes(same)
 
 
+@limits(max_examples=40)
 @given(settings(), imus, odometries, joints, stamps_ns)
 def test_the_bytes_are_rclpys_for_any_values_and_frames(
     chosen: MessageSettings,
