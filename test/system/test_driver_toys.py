@@ -91,8 +91,14 @@ def driven(probe: Probe, toy: Toy) -> Iterator[None]:
         yield
 
 
-def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:
-    """A toy robot obeys cmd_vel, and odom shows its motion. It stops when the commands end."""
+def test_a_toy_drives_and_is_heard_and_obeys_the_estop(
+    start_driver: Start, probe_of: Start, toy: Toy
+) -> None:
+    """A toy robot obeys cmd_vel, and odom shows its motion. It stops when the commands end.
+
+    While the e-stop is latched, the robot stays at rest although commands arrive. After the
+    release, the commands move it again.
+    """
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
@@ -102,17 +108,6 @@ def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: To
     with toy.served.lock:
         way_m = toy.served.board.way_m
     probe.wait_for(lambda: abs(odometry[-1].pose.pose.position.x - way_m) < 0.01)
-
-
-def test_the_estop_stops_a_toy_until_it_is_released(
-    start_driver: Start, probe_of: Start, toy: Toy
-) -> None:
-    """The e-stop is latched while commands continue to arrive. The toy robot stays at rest.
-
-    After the release, the commands move the robot again.
-    """
-    probe: Probe = probe_of(start_toy(start_driver, toy))
-    probe.wait_for_state("nominal")
     with driven(probe, toy):
         assert probe.call(SetBool, "estop", data=True).success
         toy.comes_to_a_stand()
@@ -120,7 +115,16 @@ def test_the_estop_stops_a_toy_until_it_is_released(
         toy.wait_for(lambda robot: not robot.stands)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize(
+    ("toy", "number"),
+    [
+        ("line_board", signal.SIGINT),
+        ("line_board", signal.SIGKILL),
+        ("request_board", signal.SIGKILL),
+        ("request_board", signal.SIGSTOP),
+    ],
+    indirect=["toy"],
+)
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
