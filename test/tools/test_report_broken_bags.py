@@ -28,6 +28,18 @@ def drive() -> Drive:
     return Drive(SECONDS)
 
 
+@pytest.fixture(scope="module")
+def long_drive() -> Drive:
+    """A drive whose MCAP file has several chunks."""
+    return Drive(40.0)
+
+
+@pytest.fixture(scope="module")
+def long_bag(long_drive: Drive, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag of the long drive, without compression. Tests change only copies of it."""
+    return write(tmp_path_factory.mktemp("long") / "bag", [long_drive])
+
+
 def log_of(path: Path) -> Log:
     return read(path, None, lambda _done, _total: None)
 
@@ -99,11 +111,14 @@ def test_metadata_that_make_no_sense_are_not_needed(
 
 @pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.STORAGE])
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
-    tmp_path: Path, mode: CompressionMode
+    tmp_path: Path, mode: CompressionMode, long_drive: Drive, long_bag: Path
 ) -> None:
     """An MCAP file breaks off. The report reads all its complete chunks."""
-    drive = Drive(40.0)  # long enough for several chunks
-    bag = write(tmp_path / "bag", [drive], compression=mode)
+    drive, bag = long_drive, tmp_path / "bag"
+    if mode is CompressionMode.NONE:
+        shutil.copytree(long_bag, bag)
+    else:
+        write(bag, [drive], compression=mode)
     size = (bag / "bag.mcap").stat().st_size
     file = cut(bag, size * 9 // 10)
     log = log_of(bag)
@@ -114,9 +129,9 @@ def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     assert file.stat().st_size == size * 9 // 10  # the file is not changed
 
 
-def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> None:
+def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path, long_bag: Path) -> None:
     """An MCAP file ends in zeros, as after a power failure. The report reads it up to the zeros."""
-    bag = write(tmp_path / "bag", [Drive(40.0)])
+    bag = Path(shutil.copytree(long_bag, tmp_path / "bag"))
     size = (bag / "bag.mcap").stat().st_size
     file = cut(bag, size * 9 // 10)
     whole = len(log_of(file).imu)

@@ -89,7 +89,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
     assert 1 / abs(1 + loop) <= worst * (1 + 1e-3)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(st.floats(0.01, 0.3), st.floats(0.0, 0.08))
 def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: float) -> None:
     """The deltas of a first-order wheel agree with scipy's response, integrated numerically."""
@@ -98,7 +98,7 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
     _check(first_order, np.array([time_constant_s, delay_s]), times_s, response, delay_s)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     st.floats(3.0, 40.0),
     st.floats(0.2, 3.0),
