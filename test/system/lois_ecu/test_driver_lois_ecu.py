@@ -48,12 +48,16 @@ New = tuple[Ecu, Driver, Probe]
 
 
 @pytest.mark.parametrize("firmware", QUIRKS)
-def test_it_drives_and_odometry_tells_how_far(
+def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board(
     firmware: str, stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> None:
-    """The robot drives 1 m and stops when the commands end. Odometry is within 4 cm of the truth.
+    """The robot drives 0.6 m and stops when the commands end. Odometry is within 3 cm of the truth.
 
     The driver sets other controller gains, because the robot would swerve with the board's own.
+
+    Then the board restarts. The driver writes the gains again, and the robot obeys new commands.
+    The pose in odom continues from its value before the restart. The error is at most 8 cm, or at
+    most 3 sigma if this is more.
     """
     ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
@@ -62,12 +66,12 @@ def test_it_drives_and_odometry_tells_how_far(
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
     with driven(probe, ecu):
-        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 1.0)
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.6)
     ecu.stands_for_good()
     truth = ecu.do(lambda board: board.truth)
     probe.wait_for_later_stamp(odometry)
     place = odometry[-1].pose.pose.position
-    assert math.hypot(place.x - truth.x_m, place.y - truth.y_m) < 0.04
+    assert math.hypot(place.x - truth.x_m, place.y - truth.y_m) < 0.03
     assert joints[-1].name == ["left_wheel_joint", "right_wheel_joint"]
     ticks = ecu.do(lambda board: [wheel.ticks for wheel in board.wheels])
     rolled_m = [ticks_of_wheel * math.tau * 0.13 / 60 for ticks_of_wheel in ticks]
@@ -75,6 +79,18 @@ def test_it_drives_and_odometry_tells_how_far(
     assert 0.0 < odometry[-1].pose.covariance[0] < 0.05
     stamps = [m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in odometry]
     assert all(after > before for before, after in pairwise(stamps))
+    ecu.do(lambda board: board.reboot())
+    ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))
+    ecu.wait_for(lambda board: board._timers[0x12].period_ms == 200)
+    probe.wait_for_state("nominal")
+    with driven(probe, ecu):
+        probe.wait_for(lambda: odometry[-1].pose.pose.position.x > place.x + 0.3)
+    ecu.stands_for_good()
+    truth = ecu.do(lambda board: board.truth)
+    probe.wait_for_later_stamp(odometry)
+    place, covariance = odometry[-1].pose.pose.position, odometry[-1].pose.covariance
+    error_m = math.hypot(place.x - truth.x_m, place.y - truth.y_m)
+    assert error_m < max(0.08, 3 * math.sqrt(covariance[0] + covariance[7]))
 
 
 def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None:
@@ -132,37 +148,6 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
         ecu.stands_for_good()
         assert probe.call(SetBool, "estop", data=False).success
         ecu.wait_for(lambda board: not board.standing)
-
-
-@pytest.mark.parametrize("firmware", QUIRKS)
-def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
-    firmware: str, stack: ExitStack, start_driver: Start, probe_of: Start
-) -> None:
-    """The board restarts after a drive. The driver writes the controller gains again.
-
-    The pose in odom continues from its value before the restart. The error is at most 8 cm, or at
-    most 3 sigma if this is more.
-    """
-    ecu = ecu_of(firmware, stack)
-    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
-    probe.wait_for_state("nominal")
-    ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))
-    odometry = probe.listen(Odometry, "odom")
-    with driven(probe, ecu):
-        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
-    ecu.stands_for_good()
-    ecu.do(lambda board: board.reboot())
-    ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))
-    ecu.wait_for(lambda board: board._timers[0x12].period_ms == 200)
-    probe.wait_for_state("nominal")
-    with driven(probe, ecu):
-        probe.wait_for(lambda: odometry[-1].pose.pose.position.x > 0.7)
-    ecu.stands_for_good()
-    truth = ecu.do(lambda board: board.truth)
-    probe.wait_for_later_stamp(odometry)
-    place, covariance = odometry[-1].pose.pose.position, odometry[-1].pose.covariance
-    error_m = math.hypot(place.x - truth.x_m, place.y - truth.y_m)
-    assert error_m < max(0.08, 3 * math.sqrt(covariance[0] + covariance[7]))
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:

@@ -78,36 +78,16 @@ def test_a_fix_of_the_public_firmware_is_none(
     assert fixes[-1].status.status == NavSatStatus.STATUS_NO_FIX
 
 
-def test_duties_are_commanded_in_duty_mode_alone(
-    start_driver: Start, probe_of: Start, stack: ExitStack
-) -> None:
-    """The drive mode is "duty", and a user commands duties. The driver limits them to ``max_duty``.
-
-    The duties expire like other commands.
-    """
-    ecu = ecu_of("firmware", stack)
-    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
-    probe: Probe = probe_of(driver)
-    probe.wait_for_state("nominal")
-    publisher = probe.publisher(Float32MultiArray, "duty_cmd")
-    timer = probe.node.create_timer(
-        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 60.0]))
-    )
-    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [20, 40])
-    ecu.wait_for(lambda board: not board.standing)
-    probe.remove(timer)
-    ecu.stands_for_good()
-
-
-def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
+def test_duties_are_commanded_in_duty_mode_and_one_that_waited_is_refused(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
     """A duty command arrives while the driver is suspended, and is refused when the driver resumes.
 
-    The driver recognises the delay although the message has no timestamp.
+    The driver recognises the delay although the message has no timestamp. It obeys later duties,
+    and limits them to ``max_duty``. The duties expire like other commands.
     """
     ecu = ecu_of("firmware", stack)
-    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
+    driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
     publisher = probe.publisher(Float32MultiArray, "duty_cmd")
@@ -119,6 +99,13 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
     driver.wait_for_line("motion command refused: it waited")
     ecu.stands_for_good()
     assert ecu.do(lambda board: board.truth.x_m) == 0.0
+    timer = probe.node.create_timer(
+        0.1, lambda: publisher.publish(Float32MultiArray(data=[30.0, 60.0]))
+    )
+    ecu.wait_for(lambda board: [wheel.duty_percent for wheel in board.wheels] == [20, 40])
+    ecu.wait_for(lambda board: not board.standing)
+    probe.remove(timer)
+    ecu.stands_for_good()
 
 
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
