@@ -5,7 +5,7 @@
 from dataclasses import dataclass, field
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.core.errors import CommandRefused
@@ -123,6 +123,7 @@ def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_fir
     assert delay.total_s == pytest.approx(waited_s)
 
 
+@settings(max_examples=30)
 @given(st.sampled_from([1, -1]), st.floats(1.0, 1e6), st.booleans())
 def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, shared: bool) -> None:
     """The driver's clock is set, alone or with the sender's clock. No command is refused."""
@@ -139,6 +140,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
             )
 
 
+@settings(max_examples=40)
 @given(st.floats(1.0, 1e6), st.floats(0.0, 0.3))
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
@@ -197,6 +199,7 @@ def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> 
     assert [refused(delay) for delay in outage] == 35 * [True] + 5 * [False]
 
 
+@settings(max_examples=30)
 @given(offsets_s, offsets_s, st.lists(st.integers(0, 1), min_size=50, max_size=100))
 def test_two_senders_with_clocks_of_their_own_are_both_heard(
     one_s: float, other_s: float, turns: list[int]

@@ -57,8 +57,10 @@ class Rig:
     def output(self) -> Path:
         return self.folder / "robot.yaml"
 
-    def calibrate(self, *words: str, answer: Answer = yes) -> int:
+    def calibrate(self, *words: str, answer: Answer = yes, draws: bool = True) -> int:
         """Run a calibration in this process, and return its exit code.
+
+        ``draws``: whether the picture is drawn, which takes a second.
 
         If it ends with an error because the computer was too busy, it is begun again.
         """
@@ -70,7 +72,9 @@ class Rig:
         files = ("--output", str(self.output), "--plot", str(self.folder))
         for _ in range(ATTEMPTS):
             since, errors = len(self.driver.lines), StringIO()
-            with redirect_stderr(errors):
+            with redirect_stderr(errors), pytest.MonkeyPatch.context() as patch:
+                if not draws:
+                    patch.setattr("omnibot_driver.tools.calibrate.files.draw", lambda *_: None)
                 code = main([*words, *files, "--namespace", self.driver.namespace], read)
             print(errors.getvalue(), file=sys.stderr, end="")
             was_busy = any(STALLED in line for line in self.driver.lines[since:]) or any(

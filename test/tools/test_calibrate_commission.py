@@ -44,7 +44,7 @@ def test_the_whole_walk_finds_what_was_planted(
 ) -> None:
     """The robot has reversed axes, another delta frame and a turned IMU.
 
-    The tool finds them, although the user's first answer is impossible. A driver loads the file.
+    The tool finds them, although the user's first answer is impossible. A driver can load the file.
     """
     with rig(
         tmp_path,
@@ -66,12 +66,11 @@ def test_the_whole_walk_finds_what_was_planted(
             "imu_rpy": [3.1416, 0.0, 1.5708],
         }
         assert set(robot.written()) <= {*PARAMETERS.calibrated, *calibration.RECORDED}
+        loaded = calibration.load(robot.output, PARAMETERS)
+        assert list(loaded["axis_signs"]) == [1, -1, -1]
+        assert loaded["delta_frame"] == "body"
         assert "xacro_args" in said
         assert (tmp_path / "calibrate_commission.png").stat().st_size > 10_000
-    with rig(tmp_path, {"calibration_file": str(robot.output)}) as again:
-        now = parameters_of(again.driver)
-    assert now["axis_signs"] == [1, -1, -1]
-    assert now["delta_frame"] == "body"
 
 
 def test_a_speed_limit_is_not_taken_for_positional_control(
@@ -99,7 +98,7 @@ def test_switch_and_deltas_are_told_by_the_data(
 ) -> None:
     """The tool finds the control method and the meaning of the deltas from odometry alone."""
     with rig(tmp_path, **planted) as robot:
-        assert robot.calibrate("commission", "--only", "board") == 0
+        assert robot.calibrate("commission", "--only", "board", draws=False) == 0
         assert robot.written().items() >= found.items()
 
 
