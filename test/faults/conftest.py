@@ -20,7 +20,7 @@ def _ros() -> Iterator[None]:
 def lenience() -> dict[str, float]:
     """Return three durations for ``Rig``, in s. They are suitable for a busy computer.
 
-    ``rest_s`` is short, but long enough for ten commands. A commander that does not stop is
+    ``rest_s`` is short, but long enough for six commands. A commander that does not stop is
     therefore noticed. ``make faults`` uses other times: 0.1 s, 2 s and 1 s.
     """
-    return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.5}
+    return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}
