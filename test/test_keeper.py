@@ -24,7 +24,7 @@ from guarded_line import (
 )
 
 from omnibot_driver.core.packets import packed
-from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
+from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
@@ -137,19 +137,20 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """Guards hang and cannot be killed. The driver starts no more guards after a limit.
 
-    The limit is ``MOST_DYING``.
+    The limit is ``MOST_DYING``, in this test 2.
     """
+    monkeypatch.setattr("omnibot_driver.keeper.MOST_DYING", 2)
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
         undying.setattr("subprocess.Popen.kill", lambda _process: None)
-        for second in range(2 * MOST_DYING * HANGS_AFTER):
+        for second in range(4 * HANGS_AFTER):
             for pid in set(line.children()) - stopped:
                 os.kill(pid, signal.SIGSTOP)
                 os.waitid(os.P_PID, pid, os.WSTOPPED)
                 stopped.add(pid)
             keeper.beat(EARLY_S + second)
-    assert len(line.children()) == MOST_DYING
+    assert len(line.children()) == 2
     for pid in stopped:
         os.kill(pid, signal.SIGKILL)
     beat_until(keeper, lambda: stopped.isdisjoint(line.children()))

@@ -90,15 +90,22 @@ omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 """
 
 
-@pytest.mark.parametrize("topic", ["cmd_vel", "wheel_cmd", "cmd_pose"])
+@pytest.mark.parametrize(
+    ("control", "topics"), [("velocity", ["cmd_vel", "wheel_cmd"]), ("position", ["cmd_pose"])]
+)
 def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
-    start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path, topic: str
+    start_board: Start,
+    start_driver: Start,
+    probe_of: Start,
+    tmp_path: Path,
+    control: str,
+    topics: list[str],
 ) -> None:
     """The driver's executor is blocked, so a command waits for 2 s. The driver refuses it.
 
     A goal is refused, too, even if its stamp is recent.
     """
-    hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
+    hold = tmp_path / "hold"
     board: PtyBoard = start_board(control=control, running=True)
     driver: Driver = start_driver(
         board.path, control_method=control, before=HELD_UP.format(path=str(hold))
@@ -107,36 +114,44 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
     probe.wait_for(lambda: len(odometry) > 10)
-    message: Any = Float32MultiArray(data=[10.0, 0.0, 0.0])
-    if topic == "cmd_vel":
-        message = Twist()
-        message.linear.x = 0.3
-    elif topic == "cmd_pose":
-        message = PoseStamped()
-        message.header.stamp = probe.node.get_clock().now().to_msg()
-        message.pose.position.x, message.pose.orientation.w = 0.25, 1.0
-    commands, estop = probe.publisher(type(message), topic), probe.publisher(Bool, "estop")
-    driver.answers.clear()  # the probe does not publish it again
-    for _ in range(10):  # a stall of the computer is another reason for a refusal
-        said = len(driver.lines)
-        hold.touch()
-        estop.publish(Bool(data=True))
-        driver.wait_for_line("the executor is held up", said)
-        commands.publish(message)
-        old = board.board.tick + 200
-        assert board.wait_for(lambda b, old=old: b.tick > old, PATIENCE_S)
-        hold.unlink()
-        refusal = driver.wait_for_line("refused: ", said)
-        if WAITED not in refusal:
-            break
-    assert re.search(f"{topic} refused: it was sent .* s ago.*in this driver's queue", refusal)
+    estop = probe.publisher(Bool, "estop")
 
     def moved(board: SimulatedBoard) -> bool:
         return any(any(command.values) for command in board.commands)
 
-    with board.lock:
-        assert not moved(board.board)
-    assert board.wait_for(lambda b: commands.publish(message) or moved(b), PATIENCE_S)
+    for topic in topics:
+        message: Any = Float32MultiArray(data=[10.0, 0.0, 0.0])
+        if topic == "cmd_vel":
+            message = Twist()
+            message.linear.x = 0.3
+        elif topic == "cmd_pose":
+            message = PoseStamped()
+            message.header.stamp = probe.node.get_clock().now().to_msg()
+            message.pose.position.x, message.pose.orientation.w = 0.25, 1.0
+        commands = probe.publisher(type(message), topic)
+        driver.answers.clear()  # the probe does not publish it again
+        for _ in range(10):  # a stall of the computer is another reason for a refusal
+            said = len(driver.lines)
+            hold.touch()
+            estop.publish(Bool(data=True))
+            driver.wait_for_line("the executor is held up", said)
+            commands.publish(message)
+            old = board.board.tick + 200
+            assert board.wait_for(lambda b, old=old: b.tick > old, PATIENCE_S)
+            hold.unlink()
+            refusal = driver.wait_for_line("refused: ", said)
+            if WAITED not in refusal:
+                break
+        assert re.search(f"{topic} refused: it was sent .* s ago.*in this driver's queue", refusal)
+        with board.lock:
+            assert not moved(board.board)
+        assert board.wait_for(
+            lambda b, its=commands, same=message: its.publish(same) or moved(b), PATIENCE_S
+        )
+        if topic != topics[-1]:
+            assert board.wait_for(lambda b: not any(newest(b).values), PATIENCE_S)
+            with board.lock:
+                board.board.commands.clear()
 
 
 def test_a_zero_twist_is_the_stop_frame(

@@ -242,40 +242,24 @@ def test_commands_under_estop_are_refused_and_told_what_to_do(
     assert "velocity" not in kinds(board)
 
 
-def test_estop_answers_while_a_reset_waits(
+def test_while_a_reset_waits_estop_answers_and_another_request_is_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A call of ``~/reset`` waits seconds for the board's restart.
+    """A call of ``~/reset`` waits seconds for the board's restart. ``~/estop`` answers at once.
 
-    ``~/estop`` still answers at once.
+    ``~/pause`` is refused, and the message names the reset.
     """
     board = start_board(boot_time_s=4.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
-    estop = probe.client(SetBool, "estop")
-    reset = probe.call_async(Trigger, "reset")
-    assert board.wait_for(lambda b: b.mode is BoardMode.BOOTING, PATIENCE_S)
-    assert Answer(estop, SetBool.Request(data=True)).wait().success
-    assert not reset.arrived
-    assert reset.wait().success
-
-
-def test_a_second_request_is_refused_while_one_is_under_way(
-    start_board: Start, start_driver: Start, probe_of: Start
-) -> None:
-    """A user calls ``~/pause`` during a reset.
-
-    The driver refuses, and its message names the reset.
-    """
-    board = start_board(boot_time_s=3.0, running=True)
-    probe: Probe = probe_of(start_driver(board.path))
-    probe.wait_for_state("nominal")
-    pause = probe.client(SetBool, "pause")
+    estop, pause = probe.client(SetBool, "estop"), probe.client(SetBool, "pause")
     reset = probe.call_async(Trigger, "reset")
     assert board.wait_for(lambda b: b.mode is BoardMode.BOOTING, PATIENCE_S)
     answer = Answer(pause, SetBool.Request(data=True)).wait()
     assert not answer.success
     assert "reset is under way" in answer.message
+    assert Answer(estop, SetBool.Request(data=True)).wait().success
+    assert not reset.arrived
     assert reset.wait().success
 
 

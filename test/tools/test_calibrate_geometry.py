@@ -91,12 +91,12 @@ def test_any_geometry_is_found_within_what_is_claimed(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """The sizes of 60 robots with slip are fitted. The claimed uncertainties agree with the errors.
+    """The sizes of 40 robots with slip are fitted. The claimed uncertainties agree with the errors.
 
     An error divided by its claimed uncertainty has a standard deviation near 1.
     """
     scores = []
-    for seed in range(60):
+    for seed in range(40):
         random = np.random.default_rng(seed)
         found = fit(readings(1.03 * PERFECT, 0.98, random), BASE_M, DRIFT)
         wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
