@@ -14,5 +14,5 @@ def test_a_busy_computer_loses_no_message(tmp_path: Path, lenience: dict[str, fl
     Everything that the board sends is published, in order.
     """
     with PiecesRig(tmp_path, BOARD, **lenience) as rig:
-        is_busy(rig, ticks=300)
+        is_busy(rig, ticks=200)
         assert not rig.findings.take(), rig.driver.output

@@ -9,6 +9,13 @@ from omnibot_board import BOARD
 from other_rigs import NetworkRig
 from stuck import NETWORK
 
+LEFT_OUT = "socket: the server holds what goes to the board"
+"""A case that is similar to the one in which the server holds everything.
+
+``make faults`` runs both.
+"""
+CASES = {name: case for name, case in NETWORK.items() if name != LEFT_OUT}
+
 
 @pytest.fixture(scope="module")
 def network(
@@ -19,7 +26,7 @@ def network(
         yield rig
 
 
-@pytest.mark.parametrize("case", NETWORK.values(), ids=NETWORK)
+@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
     case: Callable[[NetworkRig], None], network: NetworkRig
 ) -> None:
