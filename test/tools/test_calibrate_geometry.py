@@ -178,10 +178,10 @@ def test_planted_sizes_are_found_through_a_driver_and_applied(
 
     ``--apply`` sets them in the driver.
     """
-    quick = {"max_angular_speed": 1.5}
+    quick = {"max_angular_speed": 2.5}
     planted: dict[str, Any] = {"wheel_radius_scale": (1.04,) * 3, "base_radius_scale": 0.97}
     with rig(tmp_path, quick, **planted) as robot:
-        words = ("--side", "0.3", "--turns", "1", "--turning", "1.5", "--speed", "0.4")
+        words = ("--side", "0.3", "--turns", "1", "--turning", "2.5", "--speed", "0.4")
         surveyor = Surveyor(lambda: robot.port.board)
         code = robot.calibrate("geometry", *words, "--without-squares", "--apply", answer=surveyor)
         assert code == 0

@@ -29,12 +29,11 @@ Start = Callable[..., Any]
 New = tuple[TwoPorts, Driver, Probe]
 
 
-def test_it_drives_and_odometry_tells_how_far(new: New) -> None:
+def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
     """The robot drives straight, turns, drives a curve, and stops when the commands end.
 
     Its pose in odom is right within 2 cm.
     """
-    robot, _driver, probe = new
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
     with driven(probe, robot):

@@ -135,13 +135,13 @@ def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[Non
         yield
 
 
-def test_it_drives_and_odometry_tells_how_far(new: New) -> None:
+def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
     """The robot drives 0.5 m and stops when the commands end.
 
     The pose in odom is right within 1 cm.
     """
-    mart, _driver, probe = new
     odometry = probe.listen(Odometry, "odom")
+    probe.wait_for_state("nominal")
     batteries = probe.listen(BatteryState, "battery_state")
     ranges = probe.listen(Range, "range/front")
     docked = probe.listen(Bool, "docked", latched=True)
