@@ -5,8 +5,8 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
-from typing import Any, Self
+from functools import partial, partialmethod
+from typing import TYPE_CHECKING, Any, Self
 
 import rclpy
 from driver_process import PATIENCE_S
@@ -23,12 +23,27 @@ from std_msgs.msg import String
 from omnibot_driver.node import WARN_EVERY_S
 from omnibot_driver.stall_detector import SETTLE_S
 
+if TYPE_CHECKING:
+    import pytest
+
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """Options that turn off the events of the middleware, for subscriptions and for publishers.
 
 The executor would add each event to every wait. This would take more time than the messages.
 """
+
+
+def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
+    """Turn off the events of the middleware in all nodes of this process.
+
+    They would take about a tenth of the processor time of a calibration.
+    """
+    for name, events in (
+        ("create_subscription", NO_EVENTS),
+        ("create_publisher", NO_PUBLISHER_EVENTS),
+    ):
+        patch.setattr(Node, name, partialmethod(getattr(Node, name), event_callbacks=events))
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 import yaml
 from driver_process import PATIENCE_S, Driver
+from probe import leave_events_out
 
 from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
 from omnibot_driver.tools.calibrate import client, listener, motion
@@ -101,6 +102,7 @@ def rig(
         PtyBoard(board) as port,
         Driver(port=port.path, **{"cmd_vel_timeout": BUSY_S, **(parameters or {})}) as driver,
     ):
+        leave_events_out(patch)
         patch.setattr(listener, "LOST_S", BUSY_S)
         patch.setattr(motion, "LOOK_S", BUSY_S)
         for module, name in (

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import pytest
 from lois_ecu_rig import Ecu, ecu_of, set_parameter
-from probe import Probe
+from probe import Probe, leave_events_out
 from rcl_interfaces.msg import Log
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
 from std_msgs.msg import Float32MultiArray, String
@@ -145,12 +145,13 @@ def recorded(robot: Any) -> Path:
 
 
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
-    start_driver: Start, stack: ExitStack, tmp_path: Path
+    start_driver: Start, stack: ExitStack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The calibration tool records the ticks of both wheels during a drive, and stops the robot.
 
     If the driver refuses a record, the tool reports the reason.
     """
+    leave_events_out(monkeypatch)
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(
         ecu.path,
