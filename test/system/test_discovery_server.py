@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from driver_process import PATIENCE_S
 
-DRIVERS = 4
+DRIVERS = 16
 FLEET, OBSERVER = (
     Path(__file__).with_name(name) for name in ("fleet_of_drivers.py", "fleet_observer.py")
 )
@@ -59,8 +59,8 @@ def free_udp_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def test_a_super_client_finds_all_drivers_through_the_server() -> None:
-    """Four drivers and an observer are clients of a discovery server. The observer finds them all.
+def test_a_super_client_finds_16_drivers_through_the_server() -> None:
+    """16 drivers and an observer are clients of a discovery server. The observer finds all drivers.
 
     Clients do not use multicast.
     """
