@@ -55,7 +55,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         if restarts:
             bench.robot.drive.reboot()
             bench.robot.front.reboot()
-            bench.run(3.5)
+            bench.run(2.5)
         drive, front = bench.robot.drive.config, bench.robot.front.config
         assert drive.radii_m == (0.08, 0.081)
         assert (drive.gear, drive.ticks, drive.wheel_base_m) == (20.0, 48.0, 0.41)
@@ -65,7 +65,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         assert front.steering[:2] == (1.0, 40.0)
         assert bench.board.geometry.track_m == 0.41
         mark = bench.now
-        bench.run(2.0)
+        bench.run(1.2)
         written = {setting.command for setting in Written}
         assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
         assert bench.board.advice is None
@@ -78,7 +78,7 @@ def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
     A notice names the setting.
     """
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
-    bench.run(6.0)
+    bench.run(4.0)
     assert any("confw" in text for text in bench.notices)
 
 
@@ -148,10 +148,10 @@ def test_a_small_change_by_the_user_is_written() -> None:
     """The user changes a setting very little. The driver still writes it."""
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
-    bench.run(2.0)
+    bench.run(1.0)
     mark = bench.now
     bench.board.settings = FejemisSettings(written={Written.WHEELS: second})
-    bench.run(3.0)
+    bench.run(2.0)
     assert bench.robot.drive.config.radii_m == (0.0772, 0.0778)
     assert bench.lines(DRIVE, mark).count("confw 0.0772 0.0778 19 68 0.4") == 1
     assert bench.board.figures.own["Drive conf"].startswith("0.0772 0.0778")
@@ -165,7 +165,7 @@ def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
     """
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
-    bench.run(2.0)
+    bench.run(1.0)
     receive, damaged = bench.robot.receive, []
 
     def damage(data: bytes, now: float, channel: int) -> None:
@@ -176,7 +176,7 @@ def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
 
     bench.robot.receive = damage  # type: ignore[method-assign]
     bench.board.settings = FejemisSettings(written={Written.WHEELS: second})
-    bench.run(3.0)
+    bench.run(2.0)
     assert damaged
     assert bench.robot.drive.config.radii_m == (0.0772, 0.0778)
     assert bench.board.advice is None
@@ -213,7 +213,7 @@ def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() ->
     bench.board.settings = FejemisSettings(written={Written.STEERING: (0.4, 0.4205)})
     bench.drive_on(seconds=1.0)
     assert bench.robot.drive.config.confs_m == (0.4, 0.42)
-    bench.run(3.0)
+    bench.run(2.0)
     assert bench.robot.drive.config.confs_m == (0.4, 0.4205)
     assert bench.robot.front.config.confs_m == (0.4, 0.4205)
 

@@ -123,7 +123,7 @@ def test_a_clamped_reverse_is_stopped(w: float) -> None:
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
     )
-    drive_whatever_is_said(bench, -0.2, w, 6.0)
+    drive_whatever_is_said(bench, -0.2, w, 4.5)
     bench.run(1.0)
     assert bench.robot.standing
     assert math.hypot(bench.robot.truth.x_m, bench.robot.truth.y_m) < 0.12
@@ -154,7 +154,7 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 ) -> None:
     """During a turn on the spot, the wheel goes back from 90° to 82°. The turn continues."""
     bench = nominal()
-    bench.drive_on(0.0, 0.5, seconds=3.0)
+    bench.drive_on(0.0, 0.5, seconds=2.0)
     monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
     bench.drive_on(0.0, 0.5, seconds=3.0)
     assert not bench.robot.standing
@@ -174,7 +174,7 @@ def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
     bench.run(0.5)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(4.0)
+    bench.run(2.0)
     with pytest.raises(CommandRefused, match="second time within 60 s"):
         bench.drive()
     assert bench.ask(Request.START).success

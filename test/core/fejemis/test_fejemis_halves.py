@@ -17,7 +17,7 @@ def assert_stands(bench: Bench) -> None:
     bench.run(0.8)
     assert bench.robot.standing
     before = bench.robot.truth.x_m
-    bench.run(0.7)
+    bench.run(0.3)
     assert bench.robot.truth.x_m == before
 
 
@@ -166,7 +166,6 @@ def test_boards_that_only_change_their_ports_have_not_restarted() -> None:
         ((91, 91), "both ports lead to a front board"),
         ((90, 7), "has the id 7"),
         ((0, 91), "has the id 0"),
-        ((90, 1234), "has the id 1234"),
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
@@ -176,7 +175,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
-    bench.run(6.0)
+    bench.run(4.0)
     assert sum(sentence in text for text in bench.notices) == 1
     assert bench.session.state == "connecting"
     assert not any("swapped" in text for text in bench.notices)
@@ -193,7 +192,7 @@ def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[i
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
-    bench.run(6.0)
+    bench.run(4.0)
     received = set(bench.lines(ids.index(7)))
     assert received == {"rc 2 0 0", "motv 0 0", "brush 0", "hbti"}
 
@@ -223,7 +222,7 @@ def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
     bench.speaks = speaks
     bench.open()
     bench.estop(estop)
-    bench.run(9.0)
+    bench.run(7.0)
     mark = bench.now
     bench.run(1.0)
     assert bench.lines(DRIVE, mark).count("rc 2 0 0") <= (22 if estop else 5)
@@ -365,7 +364,7 @@ def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) 
     bench.robot.front._restart(ahead_s)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(3.0)
+    bench.run(1.5)
     bench.close()
     bench.robot._at_port = bench.robot._at_port[::-1]
     bench.open()

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 
 import pytest
-from fejemis_bench import DRIVE, FRONT, nominal
+from fejemis_bench import DRIVE, FRONT, ask, nominal
 from test_fejemis_lines import GOLDEN
 
 from omnibot_driver.core.fejemis.angle_relay import AngleRelay
@@ -212,9 +212,7 @@ def said_by_the_driver() -> set[str]:
     # A parameter that sets its offsets would forbid the calibration of the accelerometer.
     bench.board.settings = FejemisSettings()
     for job in Job:
-        bench.board.services.ask(job, None, bench.now)
-        bench.settle()
-        bench.run(6.0 if job is not Job.POWER_OFF else 0.5)
+        ask(bench, job)
     bench.estop(True)
     bench.estop(False)
     bench.session.request(Request.START, None, bench.now)

@@ -127,7 +127,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
     bench.close()
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(4.0)
+    bench.run(2.0)
     assert_still_refused(bench)
 
 
@@ -139,7 +139,7 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 
     The driver notices the restart by the board's clock, and accepts motion.
     """
-    bench.run(5.0)
+    bench.run(1.5)
     bench.close()
     bench.speaks = set()
     bench.robot.drive.reboot()
@@ -147,7 +147,7 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
     bench.speaks = {DRIVE, FRONT}
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(4.0)
+    bench.run(2.0)
     bench.drive_on()
     assert not bench.robot.standing
 
@@ -188,7 +188,7 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
     bench.settle()
     bench.run(0.1)
     bench.robot.front.reboot()
-    bench.run(5.0)
+    bench.run(3.0)
     assert any("front board has restarted" in text for text in bench.notices)
     (done,) = bench.extras(JobDone)
     assert done.success
@@ -202,16 +202,13 @@ def test_a_power_off_without_an_answer_may_still_come() -> None:
     Motion is refused until ~/start, because the board may have obeyed.
     """
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
-    bench.board.services.ask(Job.POWER_OFF, None, bench.now)
-    bench.settle()
     bench.speaks = {FRONT}
-    bench.run(9.0)
-    (done,) = bench.extras(JobDone)
+    done = ask(bench, Job.POWER_OFF, 9.0)
     assert not done.success
     assert "call ~/start" in done.message
     bench.speaks = {DRIVE, FRONT}
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(4.0)
+    bench.run(2.0)
     assert_still_refused(bench)
     assert bench.ask(Request.START).success
     bench.run(1.0)
@@ -265,7 +262,7 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
     with pytest.raises(CommandRefused, match="power"):
         bench.drive()
     bench.robot.drive.reboot()
-    bench.run(4.0)
+    bench.run(2.5)
     bench.drive_on()
     assert not bench.robot.standing
 

@@ -72,7 +72,7 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
         bench.robot.drive.reboot()
         bench.run(0.2)
         bench.run_until(lambda: bench.session.state == "nominal")
-        bench.run(1.2)
+        bench.run(0.7)
         assert bench.robot.standing
         assert bench.robot.drive.subscriptions["pose"] == 20
     assert any("drive board has restarted" in text for text in bench.notices)
@@ -95,23 +95,23 @@ def test_every_restart_stops_the_robot_and_is_reported(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         commands=CommandSettings(timeout_s=60.0),
     )
-    bench.run(2.0)
+    bench.run(1.0)
     bench.drive_on(0.05)  # slowly, as the drive board does not report its last motion
     assert not bench.robot.standing
     bench.read_s = read_s
     before = dict(bench.robot.half(half).subscriptions)
     bench.robot.half(half).reboot()
-    bench.run(1.0)
+    bench.run(0.8)
     bench.run_until(lambda: any(f"{half} board has restarted" in text for text in bench.notices))
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(0.5)
+    bench.run(0.3)
     assert bench.robot.standing
     assert bench.robot.half(half).subscriptions == before
     assert_odometry_is_right(bench, 0.02)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("away_s", [0.5, 20.0])
+@pytest.mark.parametrize("away_s", [0.5, 6.0])
 def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grown(
     away_s: float,
 ) -> None:
@@ -121,8 +121,8 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
     restart. The odometry does not jump in either case.
     """
     bench = nominal()
-    bench.drive_on(0.3, 0.0, 3.0)
-    bench.run(1.5)
+    bench.drive_on(0.3, 0.0, 1.5)
+    bench.run(1.0)
     before = bench.odometry[-1].pose
     bench.close()
     bench.speaks = bench.hears = set()
@@ -170,7 +170,7 @@ def test_a_port_that_was_away_for_long_is_no_restart() -> None:
     bench = nominal()
     bench.close()
     bench.speaks = bench.hears = set()
-    bench.run(20.0)
+    bench.run(8.0)
     bench.speaks, bench.hears = {DRIVE, FRONT}, {DRIVE, FRONT}
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
@@ -217,7 +217,7 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         FejemisSettings(written=FRONT_OFFSET),
     )
-    bench.run(2.0)
+    bench.run(0.5)
     bench.read_s = 0.05 if read_s == 0.1 else read_s  # an angle of 60 ms is too old to drive
     refusals = drive_through_a_restart(bench, "front")
     if not says_start:
@@ -244,7 +244,7 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 
 @pytest.mark.slow
 @pytest.mark.parametrize("half", ["drive", "front"])
-@pytest.mark.parametrize("pause_s", [0.9, 1.3, 3.0])
+@pytest.mark.parametrize("pause_s", [0.9, 2.0])
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:

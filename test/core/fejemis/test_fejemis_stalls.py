@@ -49,7 +49,7 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
     [
         (noticed, (3.3, 4.5)[(n + m) % 2], phase_s)
         for n, noticed in enumerate((True, False))
-        for m, phase_s in enumerate((0.0, 0.03, 0.05, 0.07))
+        for m, phase_s in enumerate((0.0, 0.05) if noticed else (0.03, 0.07))
     ],
 )
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
@@ -60,10 +60,10 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
-    bench.drive_on(0.3, 0.2, 2.0)
+    bench.drive_on(0.3, 0.2, 1.0)
     bench.run(phase_s)
     stall(bench, stall_s, room=EVERYTHING, noticed=noticed)
-    bench.run(2.0)
+    bench.run(1.2)
     off = origin.way_to(bench.odometry[-1].pose) - begin.way_to(true_pose(bench))
     assert off.way_m < 0.01
     assert abs(off.yaw_rad) < 0.01
@@ -71,7 +71,7 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stall_s", [0.8, 1.3, 3.0])
+@pytest.mark.parametrize("stall_s", [0.8, 2.0])
 @pytest.mark.parametrize("room", [READ, EVERYTHING])
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
     """The driver stalls. The terminal's buffer keeps the lines of 0.37 s, or all lines.
@@ -111,7 +111,7 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stall_s", [0.8, 0.81, 1.31, 3.01])
+@pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
     """The driver stalls, so the terminal's buffer becomes full, and later bytes are lost.
 

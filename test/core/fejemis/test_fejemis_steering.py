@@ -149,7 +149,13 @@ def test_the_steered_wheel_rolls_without_slip(v: float, w: float) -> None:
     assert across == pytest.approx(0.0, abs=1e-9)
 
 
-COMMANDS = [(v, w) for v in (0.0, 0.02, 0.15, 0.6) for w in (-1.0, 0.0, 0.05, 0.5) if v or w]
+COMMANDS = [
+    *((0.0, w) for w in (-1.0, 0.05)),
+    *((0.02, w) for w in (0.0, 0.5)),
+    *((0.15, w) for w in (-1.0, 0.05)),
+    *((0.6, w) for w in (0.0, 0.5)),
+]
+"""Speeds in m/s and turn rates in rad/s."""
 
 
 @pytest.mark.slow
@@ -202,7 +208,7 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
     The robot stands while the front wheel turns by 180°, which takes over 1 s.
     """
     bench = nominal()
-    bench.drive_on(0.0, 1.0, 2.0)
+    bench.drive_on(0.0, 1.0, 1.5)
     before_m = bench.robot.truth.x_m
     bench.drive_on(0.0, -1.0, 3.0)
     assert bench.robot.truth.yaw_rate_radps == pytest.approx(-1.0, abs=0.03)
@@ -237,7 +243,7 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
     The robot only turns. One notice names the parameter.
     """
     bench = nominal()
-    bench.drive_on(v, w, 3.0)
+    bench.drive_on(v, w, 2.0)
     truth = bench.robot.truth
     assert (truth.speed_mps, truth.yaw_rate_radps) == pytest.approx((0.0, w), abs=0.01)
     assert math.hypot(truth.x_m, truth.y_m) < 0.006

@@ -4,6 +4,7 @@
 
 import math
 import struct
+from functools import cache
 from random import Random
 
 from omnibot_driver.core.lois_ecu import (
@@ -27,6 +28,7 @@ def float32(number: float) -> float:
     return float(rounded)
 
 
+@cache
 def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
     """Return the reports of a drive along a curve at 0.5 m/s, with their times in s.
 

@@ -23,6 +23,8 @@ from omnibot_driver.core.lois_ecu import (
 )
 from omnibot_driver.core.lois_ecu.messages import Report
 
+WHICH = ((True, False), (False, True), (False, False))
+"""Whether lines have checksums, and whether the firmware is the public one."""
 SEEDS = int(os.environ.get("LOIS_SEEDS", "1"))
 payloads = st.one_of(st.sampled_from([0, 0xFFFFFFFF, 0x016A016A]), st.integers(0, 2**32 - 1))
 codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
@@ -110,9 +112,10 @@ def test_a_record_without_end_is_not_kept() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("chance", [1e-3, 1e-2])
-@pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
-@pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
+@pytest.mark.parametrize(
+    ("chance", "sum_required", "firmware"),
+    [(1e-3, True, True), (1e-3, False, False), *((1e-2, *which) for which in WHICH)],
+)
 def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
     """Bytes are lost during drives of ten minutes. No report is wrong.
 

@@ -5,7 +5,7 @@
 import itertools
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lois_streams import Piece, reports
 
@@ -33,7 +33,7 @@ def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
 
 @pytest.mark.slow
 @FIRMWARE
-@pytest.mark.parametrize("pause_s", [0.06, 0.1, 0.14])
+@pytest.mark.parametrize("pause_s", [0.06, 0.14])
 def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: float) -> None:
     """The board sends bursts of lines. The host reads each burst in two parts, ``pause_s`` apart.
 
@@ -54,6 +54,7 @@ def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: fl
 
 
 @pytest.mark.slow
+@settings(max_examples=40)
 @given(st.data(), st.booleans())
 def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject, cut: bool) -> None:
     """The host reads each burst of lines in several parts, all within 145 ms.

@@ -55,11 +55,11 @@ def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
     heading".
     """
     rig = settled(firmware)
-    rig.order(20, 20, 4.0)
+    rig.order(20, 20, 3.0)
     assert rig.estimates[-1][0].source == "ticks"
     rig.order(0, 0, 2.0)
     assert rig.estimates[-1][0].source == "standing"
-    rig.order(-20, -20, 4.0)
+    rig.order(-20, -20, 3.0)
     last = rig.estimates[-1][0]
     assert last.blind is (firmware == "firmware")
     assert last.source == ("commands and heading" if last.blind else "ticks")
@@ -76,7 +76,7 @@ def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
     rig.order(20, 25, 4.0)
     rig.order(0, 0, 2.0)
     place = rig.estimates[-1][0].pose
-    rig.run(10.0)
+    rig.run(5.0)
     assert rig.estimates[-1][0].pose == place
     assert rig.estimates[-1][0].twist.vx_mps == 0.0
     predicted = rig.driver.predicted(rig.now + 0.2)
@@ -156,7 +156,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
     The estimated pose moves as far as the robot, within 12 cm.
     """
     rig = settled(firmware)
-    rig.order(*pair, 4.0)
+    rig.order(*pair, 2.5)
     first = rig.driver.predicted(rig.now)
     before = rig.place
     assert first is not None

@@ -56,20 +56,18 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TALKS)
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
-@pytest.mark.parametrize("lenient", [True, False], ids=["lenient", "strict"])
-def test_no_loss_of_up_to_two_characters_makes_another_line(
-    name: str, with_sum: bool, lenient: bool
-) -> None:
+def test_no_loss_of_up_to_two_characters_makes_another_line(name: str, with_sum: bool) -> None:
     """Up to two characters of the driver's lines are lost.
 
-    The firmware accepts only lines that the driver sent, in the order of sending.
+    The firmware accepts only lines that the driver sent, in the order of sending. A lenient reader
+    accepts all that a strict one accepts.
     """
     data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
-    said = heard(data, with_sum=with_sum, lenient=lenient)
+    said = heard(data, with_sum=with_sum, lenient=True)
     assert len(said) == len(TALKS[name])
     for lost in losses(len(data), 2):
         rest = bytes(byte for at, byte in enumerate(data) if at not in lost)
-        found = heard(rest, with_sum=with_sum, lenient=lenient)
+        found = heard(rest, with_sum=with_sum, lenient=True)
         remaining = iter(said)
         assert all(line in remaining for line in found), lost
 

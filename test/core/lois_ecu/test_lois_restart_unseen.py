@@ -56,7 +56,7 @@ def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: f
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrapped_for_s", "speed_mps"),
-    [(-0.25, 0.3), (-0.06, -0.3), (0.06, 0.3), (0.15, -0.3), (0.25, 0.3)],
+    [(-0.25, 0.3), (-0.06, -0.3), (0.06, 0.3), (0.25, -0.3)],
 )
 def test_a_restart_shows_although_the_clock_wraps_at_that_time(
     wrapped_for_s: float, speed_mps: float

@@ -46,7 +46,7 @@ def test_a_wheel_that_has_settled_is_not_doubted(
     settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A sign change of the set-points adds variance only if it comes soon after another one."""
-    soon, late = variance(settings, 0.6), variance(settings, 15.0)
+    soon, late = variance(settings, 0.6), variance(settings, 7.0)
     monkeypatch.setattr(motion_filter, "UNSETTLED_S", (0.0, 0.0))
     assert soon > 1.02 * variance(settings, 0.6)
-    assert late == pytest.approx(variance(settings, 15.0), rel=1e-3)
+    assert late == pytest.approx(variance(settings, 7.0), rel=1e-3)

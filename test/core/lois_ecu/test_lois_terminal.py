@@ -61,8 +61,10 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 
 
 @pytest.mark.slow
-@FIRMWARE
-@pytest.mark.parametrize("drive_s", [2.5, 2.56, 2.62, 2.68])
+@pytest.mark.parametrize(
+    ("firmware", "drive_s"),
+    [("documented", 2.5), ("documented", 2.62), ("firmware", 2.56), ("firmware", 2.68)],
+)
 def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
     """The user sets a terminal mode during a drive. In this mode, the board reports no motion.
 

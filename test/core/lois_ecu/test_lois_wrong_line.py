@@ -38,7 +38,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
     bench = AnyBench(board, robot)
     bench.speaks = False
     bench.open()
-    for _ in range(500):
+    for _ in range(300):
         bench.run(TICK_S)
         bench.session.inbound.receive(data[:40], bench.now)
         bench.session.inbound.receive(data[40:], bench.now)
@@ -65,6 +65,6 @@ def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     robot.board._reader.checks = not checks
     bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)
     bench.open()
-    bench.run(12.0)
-    bench.drive_on(seconds=3.0)
+    bench.run(8.0)
+    bench.drive_on(seconds=2.0)
     assert not robot.stands
