@@ -4,7 +4,7 @@
 
 import math
 from dataclasses import replace
-from statistics import median
+from statistics import mean, median
 
 import pytest
 from lois_drives import HOST_GAINS, LATE_READS_S, drive, driven, motion, nominal, off_m, wrong
@@ -23,14 +23,17 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
     """The robot drives backward. The public firmware then counts no ticks and reports integer RPM.
 
-    The distance is right within 3 %. The error of the position is below 10 % of the distance.
+    The distance is right within 3 %. The mean error of the position is below 10 % of the distance.
     """
-    one = driven(firmware, "reverse")
-    assert one.way_m > 5.0
-    way_m, true_m = (math.hypot(place.x_m, place.y_m) for place in (one.last.pose, one.true))
-    assert way_m == pytest.approx(true_m, rel=0.03)
-    assert one.sigmas < 3.0
-    assert off_m(one) < (0.02 if firmware == "documented" else 0.1) * one.way_m
+    seeds = (1,) if firmware == "documented" else (1, 2)
+    drives = [driven(firmware, "reverse", seed) for seed in seeds]
+    for one in drives:
+        assert one.way_m > 5.0
+        way_m, true_m = (math.hypot(place.x_m, place.y_m) for place in (one.last.pose, one.true))
+        assert way_m == pytest.approx(true_m, rel=0.03)
+        assert one.sigmas < 3.0
+    part = 0.02 if firmware == "documented" else 0.1
+    assert mean(off_m(one) / one.way_m for one in drives) < part
 
 
 def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:

@@ -99,7 +99,7 @@ def test_wheels_that_roll_back_are_no_restart(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("per_turn", "unit"), zip(PER_TURN, cycle(("ms", "ns")), strict=False))
+@pytest.mark.parametrize(("per_turn", "unit"), [*zip(PER_TURN, cycle(("ms", "ns")), strict=False)])
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
     """The robot drives forward at 50 RPM for 6 s, then backward for longer. No restart is assumed.
 
