@@ -65,7 +65,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         assert front.steering[:2] == (1.0, 40.0)
         assert bench.board.geometry.track_m == 0.41
         mark = bench.now
-        bench.run(1.2)
+        bench.run(2.0)
         written = {setting.command for setting in Written}
         assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
         assert bench.board.advice is None
@@ -151,7 +151,7 @@ def test_a_small_change_by_the_user_is_written() -> None:
     bench.run(1.0)
     mark = bench.now
     bench.board.settings = FejemisSettings(written={Written.WHEELS: second})
-    bench.run(2.0)
+    bench.run(3.0)
     assert bench.robot.drive.config.radii_m == (0.0772, 0.0778)
     assert bench.lines(DRIVE, mark).count("confw 0.0772 0.0778 19 68 0.4") == 1
     assert bench.board.figures.own["Drive conf"].startswith("0.0772 0.0778")

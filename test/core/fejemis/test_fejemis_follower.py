@@ -174,7 +174,7 @@ def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
     bench.run(0.5)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(2.0)
+    bench.run(4.0)
     with pytest.raises(CommandRefused, match="second time within 60 s"):
         bench.drive()
     assert bench.ask(Request.START).success

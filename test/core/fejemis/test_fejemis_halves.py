@@ -175,7 +175,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
-    bench.run(4.0)
+    bench.run(6.0)
     assert sum(sentence in text for text in bench.notices) == 1
     assert bench.session.state == "connecting"
     assert not any("swapped" in text for text in bench.notices)
@@ -192,7 +192,7 @@ def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[i
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
-    bench.run(4.0)
+    bench.run(6.0)
     received = set(bench.lines(ids.index(7)))
     assert received == {"rc 2 0 0", "motv 0 0", "brush 0", "hbti"}
 
@@ -266,7 +266,7 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
     drive_until_refused(bench)
-    bench.run(2.0)
+    bench.run(1.2)
     assert bench.robot.standing
     bench.run_until(lambda: bench.session.state == "nominal")
     bench.drive_on()
@@ -343,7 +343,7 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
     So the diagnostics no longer show the old values.
     """
     bench = nominal()
-    bench.run(6.0)
+    bench.run(5.0)
     told = {"Drive ver", "Drive bat", "Drive cvdrive", "Front id"}
     assert told <= bench.board.figures.own.keys()
     bench.close()

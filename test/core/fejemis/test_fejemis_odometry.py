@@ -240,8 +240,8 @@ def test_joint_states_follow_the_wheels() -> None:
     In the odometry, each wheel has rolled as far as the simulated wheel.
     """
     bench = nominal()
-    bench.drive_on(0.3, 0.3, 3.0)
-    bench.run(1.5)
+    bench.drive_on(0.3, 0.3, 2.0)
+    bench.run(1.0)
     left, right = WHEELS.wheel_rates(bench.odometry[-1].rolled.over(1.0))
     radius = bench.robot.settings.wheel_radius_m
     turned = [math.tau * radius * turns for turns in bench.robot.vehicle.turns]

@@ -127,7 +127,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
     bench.close()
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(2.0)
+    bench.run(4.0)
     assert_still_refused(bench)
 
 
@@ -208,7 +208,7 @@ def test_a_power_off_without_an_answer_may_still_come() -> None:
     assert "call ~/start" in done.message
     bench.speaks = {DRIVE, FRONT}
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.run(2.0)
+    bench.run(4.0)
     assert_still_refused(bench)
     assert bench.ask(Request.START).success
     bench.run(1.0)

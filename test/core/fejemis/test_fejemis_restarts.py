@@ -24,7 +24,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 RESTARTS = [
     (boot_s, read_s, (n + m) % 2 == 0)
-    for n, boot_s in enumerate((0.0, 0.05, 0.4))
+    for n, boot_s in enumerate((0.0, 0.4))
     for m, read_s in enumerate((0.001, 0.02, 0.1))
 ]
 """Duration of a boot and time between two reads in s, and whether the board says that it starts."""

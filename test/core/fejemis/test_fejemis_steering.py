@@ -243,7 +243,7 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
     The robot only turns. One notice names the parameter.
     """
     bench = nominal()
-    bench.drive_on(v, w, 2.0)
+    bench.drive_on(v, w, 3.0)
     truth = bench.robot.truth
     assert (truth.speed_mps, truth.yaw_rate_radps) == pytest.approx((0.0, w), abs=0.01)
     assert math.hypot(truth.x_m, truth.y_m) < 0.006
