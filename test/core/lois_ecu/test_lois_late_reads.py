@@ -161,7 +161,7 @@ def stalled_drive(
     * ``during``: function that is called with the time since the beginning of the stall, in s.
     """
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
-    for _ in range(40):
+    for _ in range(25):
         bench.session.command_twist(twist, bench.now)
         bench.settle()
         bench.run(0.1)

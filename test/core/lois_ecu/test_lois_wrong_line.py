@@ -38,7 +38,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
     bench = AnyBench(board, robot)
     bench.speaks = False
     bench.open()
-    for _ in range(300):
+    for _ in range(500):
         bench.run(TICK_S)
         bench.session.inbound.receive(data[:40], bench.now)
         bench.session.inbound.receive(data[40:], bench.now)

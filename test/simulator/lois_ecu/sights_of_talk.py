@@ -250,16 +250,16 @@ def record_waits_for_one_more(quirks: Quirks) -> bool:
 def large_records_never_end(quirks: Quirks) -> bool:
     """Return whether a record of the times of 1025 ticks is never sent.
 
-    The drive is so long that both wheels turn by more than 1025 ticks.
+    The drive is so long that both wheels turn by more than 1025 ticks, of 120 per turn.
     """
-    rig = Rig(quirks)
+    rig = Rig(quirks, steps=120)
     rig.run(2.1)
     rig.say(SetDuty(100, 100))
     rig.board.receive(with_sum(b":0404010401"))
     rig.run(0.1)
     assert rig.board.commands[-1].command == 0x04
     rig.decoder.expect_record(RecordKind.RPM, 1024, 1024)
-    reports = rig.run(22.0)
+    reports = rig.run(13.0)
     assert [len(wheel.record) for wheel in rig.board.wheels] == [1024, 1024]
     return not any(isinstance(report, Record) for report in reports)
 
