@@ -55,7 +55,6 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
     wheels = kinematics(values)
     sign = -1 if values["encoder_inverted"] else 1
     return MartSettings(
-        wheel_radius_m=wheels.wheel_radius_m,
         track_m=wheels.track_m,
         metres_per_count=sign * values["odom_linear_scale"] * values["metres_per_count"],
         speed_per_unit=1.0 / values["linear_scale"],

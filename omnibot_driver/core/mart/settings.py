@@ -31,7 +31,6 @@ class MartSettings:
     ``gyro_drift_radps``: standard deviation of the gyro's drift.
     """
 
-    wheel_radius_m: float = 0.0625
     track_m: float = 0.40
     metres_per_count: float = 0.0004
     speed_per_unit: float = 0.0085
