@@ -5,6 +5,7 @@
 import ast
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -92,3 +93,36 @@ def test_every_parameter_is_read(board: str) -> None:
         f"no code reads these parameters, so they have no effect: {', '.join(without)}. Did you"
         f" fill the field in `settings` of boards/{board}.py?"
     )
+
+
+UNLIKE_THE_ROW = {"mart": {"speed_per_unit"}, "fejemis": {"wheelbase_m"}}
+"""Fields of a board's settings whose default is not that of the parameter."""
+
+
+@pytest.mark.parametrize("board", boards.PROFILES)
+def test_the_settings_have_the_defaults_of_the_parameters(board: str) -> None:
+    """The defaults of a board's settings are those of the parameters.
+
+    The test also fails if ``settings`` does not fill a field, or exchanges two fields.
+    """
+    settings = boards.load(board).settings(boards.check_all({"board": board}))
+    defaults = type(settings)()
+    different = {
+        field.name
+        for field in fields(settings)
+        if getattr(settings, field.name) != getattr(defaults, field.name)
+    }
+    assert different == UNLIKE_THE_ROW.get(board, set())
+
+
+@pytest.mark.parametrize("board", boards.PROFILES)
+def test_the_core_of_a_board_reads_all_of_its_settings(board: str) -> None:
+    """Each field of a board's settings is read in the board's folder of the core."""
+    settings = boards.load(board).settings(boards.check_all({"board": board}))
+    read = {
+        node.attr
+        for file in (PACKAGE / "core" / board).glob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)
+    }
+    assert {field.name for field in fields(settings)} <= read

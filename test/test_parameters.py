@@ -5,6 +5,7 @@
 It agrees with the promised names, with the core and with the parameter file.
 """
 
+import re
 from pathlib import Path
 
 import pytest
@@ -102,7 +103,10 @@ def test_every_default_passes_its_own_check_and_is_explained(parameter: Paramete
     assert parameter.description.endswith(".")
     assert (parameter.low is None) == (parameter.high is None)
     if parameter.kind is float:
-        assert parameter.unit or parameter.name in DIMENSIONLESS, "give it a unit"
+        assert parameter.unit or parameter.name in DIMENSIONLESS, (
+            "give it a unit; if it is a pure number, add its name to DIMENSIONLESS in"
+            " test/test_parameters.py"
+        )
     if parameter.kind in (int, float):
         limited = parameter.low is not None or parameter.choices
         assert limited, "a number without limits lets NaN through"
@@ -127,7 +131,7 @@ def test_tuning_may_change_while_it_runs(name: str) -> None:
 
 def test_what_is_not_given_is_the_default() -> None:
     """A parameter has its default value unless the user gives another."""
-    assert check_all({}) == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
+    assert check_all({}) == {parameter.name: parameter.initial for parameter in PARAMETERS.rows}
     values = check_all({"max_linear_speed": 1, "port": "/dev/ttyACM3"})
     assert values["max_linear_speed"] == 1.0
     assert values["port"] == "/dev/ttyACM3"
@@ -200,7 +204,7 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     values = check_all(
         {
             "linear_scale": 71, "angular_scale": 501, "wheel_radius": 0.03, "delta_frame": "body",
-            "position_scale": 900, "heading_scale": 800,
+            "delta_period": 0.1, "position_scale": 900, "heading_scale": 800,
             "pose_byte_order": "little", "accel_range": 8, "gyro_range": 1000,
             "max_linear_speed": 0.6, "max_angular_speed": 0.7, "max_wheel_speed": 18,
             "max_linear_acceleration": 0.8, "max_angular_acceleration": 0.9,
@@ -221,6 +225,7 @@ def test_values_reach_the_core_under_their_meaning() -> None:
     assert (board.linear_scale, board.angular_scale, board.wheel_radius_m) == (71.0, 501.0, 0.03)
     assert (board.position_scale, board.heading_scale) == (900.0, 800.0)
     assert (board.delta_frame, board.pose_byte_order) == ("body", "little")
+    assert board.delta_period_s == 0.1
     assert (board.imu.accel_range_g, board.imu.gyro_range_dps) == (8, 1000)
     limits = session.limits
     assert (limits.linear_mps, limits.angular_radps, limits.wheel_radps) == (0.6, 0.7, 18.0)
@@ -261,9 +266,12 @@ def test_the_file_has_its_former_name_as_well() -> None:
 
 
 def test_the_file_of_parameters_is_the_table() -> None:
-    """The parameter file has every name with its default, of exactly the parameter's type."""
+    """The parameter file has every name with its default, of exactly the parameter's type.
+
+    The names of unset parameters are in comments.
+    """
     values = in_the_file()
-    assert values == {parameter.name: parameter.default for parameter in PARAMETERS.rows}
+    assert values == {row.name: row.default for row in PARAMETERS.rows if not row.unset}
     for name, value in values.items():
         assert type(value) is type(PARAMETERS.by_name[name].default), name
 
@@ -275,7 +283,7 @@ def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None
     Some parameters have choices in place of a range.
     """
     text = CONFIG.read_text(encoding="utf-8")
-    comment = text.split(f"\n    {parameter.name}:")[0].rsplit("\n\n", 1)[-1]
+    comment = re.split(rf"\n    (?:# )?{parameter.name}:", text)[0].rsplit("\n\n", 1)[-1]
     words = " ".join(comment.replace("#", " ").split())
     assert parameter.description in words
     assert parameter.allowed in words

@@ -24,8 +24,14 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 class Parameter:
     """One parameter: a row in the parameter table of a board.
 
+    ``name``: lower case, with ``_`` between words. The value of a name that ends in ``_frame`` is
+    checked as a frame's name. If the names ``…_minimum`` and ``…_maximum`` both exist, they are the
+    limits of a range sensor in m, and the first must be below the second.
+    ``unit``: such as "m/s"; empty if the value has no unit.
+    ``description``: one sentence or a few. The first one says what the value is or does.
     ``default``: its type is the parameter's type. A list has at least one item.
-    ``low``, ``high``, ``choices``: limits and allowed values; for a list, those of each item.
+    ``low``, ``high``, ``choices``: limits and allowed values; for a list, those of each item. A
+    number needs both limits, or choices.
     ``fixed``: whether the value is read-only after the start.
     ``calibrated``: whether a calibration file may contain the value.
     ``length``: smallest and largest length of a list; None: the length of the default.

@@ -202,10 +202,13 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
 
 
 def _require_ranges(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if a range sensor's smallest distance is not below its largest one."""
+    """Raise ParameterError if a range sensor's smallest distance is not below its largest one.
+
+    If the parameter with ``_maximum`` does not exist, the parameter with ``_minimum`` is accepted.
+    """
     for least in (name for name in values if name.endswith("_minimum")):
         most = f"{least.removesuffix('minimum')}maximum"
-        if values[least] >= values[most]:
+        if most in values and values[least] >= values[most]:
             raise ParameterError(
                 f"parameter '{least}' ({values[least]:g} m) must be below '{most}'"
                 f" ({values[most]:g} m)"
