@@ -96,12 +96,13 @@ def unit_settings() -> dict[str, list[str]]:
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
     """The systemd unit starts the driver without a shell in between.
 
-    Signals therefore reach the driver itself.
+    Signals therefore reach the driver itself. The port is that of the parameter file, because each
+    board has other ports.
     """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
     assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)
-    assert "port:=/dev/omnibot" in command
+    assert command.endswith(' --params-file "$OMNIBOT_PARAMETERS"\'')
 
 
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
