@@ -69,7 +69,7 @@ docs: $(VENV)/.docs  ## write what is generated, and build the documents as a si
 pictures: $(VENV)/.test  ## make the pictures of README and documents anew (5 minutes)
 	@$(PY) test/pictures
 
-integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (15 minutes), into docs/internals/integrity.md
+integrity: $(VENV)/.test  ## measure damaged lines of BOARD, both ways (20 minutes), into docs/internals/integrity.md
 	$(PY) test/integrity/report.py --board $(BOARD) || inbound=$$?; \
 	  $(PY) test/integrity/outbound.py --board $(BOARD) && exit $${inbound:-0}
 
