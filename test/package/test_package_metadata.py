@@ -182,6 +182,12 @@ def test_only_tools_need_what_an_extra_brings() -> None:
     assert {item for item in needing if item[0] != "tools"} == {("recording.py", "rosbags")}
 
 
+def test_the_readme_names_all_libraries_of_the_tools() -> None:
+    """Without rosdep, users install the libraries of the tools by a pip command in the README."""
+    words = f"`pip install {' '.join(EXTRAS['tools'])}`"
+    assert words in (ROOT / "README.md").read_text()
+
+
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
     """rosdep cannot install suitable versions of two libraries. A pip command installs them.
 
