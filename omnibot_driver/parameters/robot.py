@@ -66,7 +66,8 @@ ROBOT: Final = (
         "m/s²",
         "Highest linear acceleration that the robot can reach, even in a collision. The driver"
         " rejects a displacement that differs from the previous one by more than this acceleration"
-        " permits, if the next displacement jumps back.",
+        " permits, if the next displacement jumps back. docs/internals/architecture.md has the"
+        " exact rule (Implausible readings).",
         low=0.1,
         high=1000.0,
     ),
@@ -76,7 +77,8 @@ ROBOT: Final = (
         "rad/s²",
         "Highest angular acceleration that the robot can reach, even in a collision. The driver"
         " rejects a displacement or gyro reading that differs from the previous one by more than"
-        " this acceleration permits, if the next one jumps back.",
+        " this acceleration permits, if the next one jumps back. docs/internals/architecture.md"
+        " has the exact rule (Implausible readings).",
         low=1.0,
         high=10_000.0,
     ),
@@ -86,7 +88,8 @@ ROBOT: Final = (
         "m/s²",
         "Largest change of an accelerometer axis, from one reading to the next, with which the"
         " driver always accepts the reading. It rejects a reading only if the change is larger, the"
-        " next reading jumps back, and a flipped bit can explain the change.",
+        " next reading jumps back, and a flipped bit can explain the change."
+        " docs/internals/architecture.md has the exact rule (Implausible readings).",
         low=0.1,
         high=1000.0,
     ),
@@ -180,7 +183,8 @@ NOISE: Final = (
         "odom_gap_acceleration",
         1.0,
         "m/s²",
-        "Largest linear acceleration that the driver assumes while odometry frames are missing.",
+        "Largest linear acceleration that the driver assumes while odometry frames are missing."
+        " It limits no motion: it sets how uncertain the odometry is after a gap.",
         low=0.0,
         high=100.0,
     ),
@@ -188,7 +192,8 @@ NOISE: Final = (
         "odom_gap_angular_acceleration",
         5.0,
         "rad/s²",
-        "Largest angular acceleration that the driver assumes while odometry frames are missing.",
+        "Largest angular acceleration that the driver assumes while odometry frames are missing."
+        " It limits no motion: it sets how uncertain the odometry is after a gap.",
         low=0.0,
         high=1000.0,
     ),
