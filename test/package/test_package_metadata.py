@@ -278,6 +278,12 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
     assert checked == without_ros
 
 
+def test_the_hook_of_git_has_the_formatter_of_the_tests() -> None:
+    """The hook of pre-commit and ``make lint`` use the same version of ruff."""
+    (version,) = re.findall(r"rev: v(\S+)", (ROOT / ".pre-commit-config.yaml").read_text())
+    assert f"ruff=={version}\n" in (ROOT / "requirements/test.txt").read_text()
+
+
 def test_every_source_file_says_whose_it_is() -> None:
     """The first line of each source file names the maintainer of package.xml, and the licence."""
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
