@@ -13,12 +13,13 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver import boards
+from omnibot_driver import boards, parameters
 from omnibot_driver.boards import check_all, omnibot
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
+from omnibot_driver.core.omnibot import OmniBot
 from omnibot_driver.parameters import Parameter, session_settings
 
 CONFIG = Path(__file__).parent.parent / "config" / "omnibot.yaml"
@@ -319,3 +320,9 @@ def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
     table = boards.table_for({"board": "fejemis"})
     with pytest.raises(ParameterError, match=r"'tof_minimum' \(3 m\) must be below 'tof_maximum'"):
         table.check_all({"board": "fejemis", "tof_minimum": 3.0, "tof_maximum": 2.0})
+
+
+def test_a_minimum_without_a_maximum_is_accepted() -> None:
+    """A board has a parameter whose name ends in ``_minimum``, without one for the maximum."""
+    row = Parameter("battery_minimum", 20.0, "V", "Lowest voltage.", low=0.0, high=60.0)
+    assert parameters.table("omnibot", OmniBot.traits, own={"Own": (row,)}).check_all({})
