@@ -71,7 +71,7 @@ class LongTask:
         """Fail the task if its time limit has passed."""
         if now >= self.wake_at:
             limit_s = self.wake_at - self._begun_at
-            self.give_up(f"the board did not complete it within {limit_s:g} s")
+            self.give_up(f"the board did not complete it within {limit_s:g} s; call again")
 
     def progress(self, now: float) -> str:
         """Return the task's name, elapsed time and limit as text; empty without a task."""

@@ -108,7 +108,9 @@ class SafetyStops:
                 self._reporter.notify([f"e-stop latched by {by}"])
             self._policy.latch(now)
             self._mode_manager.give_up_start()
-            self._task.give_up("the e-stop was latched during the request")
+            self._task.give_up(
+                "the e-stop was latched during the request; release it, then call again"
+            )
             if not latched:
                 self._measurement.inertial.calibration.give_up(
                     "the e-stop was latched meanwhile; call again"

@@ -46,7 +46,11 @@ def test_it_ends_when_its_time_is_over() -> None:
     assert task.active
     task.tick(125.0)
     assert task.answers == [
-        RequestDone("token", False, "the record failed: the board did not complete it within 120 s")
+        RequestDone(
+            "token",
+            False,
+            "the record failed: the board did not complete it within 120 s; call again",
+        )
     ]
 
 

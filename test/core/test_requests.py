@@ -64,7 +64,7 @@ def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None
     bench.session.closed(bench.now)
     bench.settle()
     (done,) = [event for event in bench.events if isinstance(event, RequestDone)]
-    assert (done.success, done.message) == (False, "the driver is shutting down")
+    assert (done.success, done.message) == (False, "the driver is shutting down; start it again")
 
 
 def test_requests_without_a_port_are_refused() -> None:

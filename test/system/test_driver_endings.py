@@ -154,7 +154,7 @@ def test_a_pending_service_answers_although_the_executor_learns_of_its_result_la
     estop.publish(Bool(data=True))
     driver.wait_for_line("held")
     assert driver.end(signal.SIGTERM) == 0
-    assert reset.wait().message == "the driver is shutting down"
+    assert reset.wait().message == "the driver is shutting down; start it again"
 
 
 EXPLODES = """

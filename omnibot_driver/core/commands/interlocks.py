@@ -44,7 +44,7 @@ class Interlocks:
 
     def why_not_request(self) -> str:
         """Return the reason why requests are refused now; empty if they are allowed."""
-        return "the driver is shutting down" if self.leaving else self.missing
+        return "the driver is shutting down; start it again" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
         """Record that a motion command was refused, so that its sender is known to be active.

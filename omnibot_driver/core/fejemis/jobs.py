@@ -145,7 +145,7 @@ class Jobs:
         """
         if role == "front" and self.job is Job.POWER_OFF:
             return
-        self.cancel(f"the {role} board has restarted")
+        self.cancel(f"the {role} board has restarted; call again")
         if role == "drive":
             self.powering_off = False
 

@@ -56,7 +56,7 @@ class Upkeep:
         """
         self._leaving = True
         self.machine.off()
-        self.jobs.cancel("the driver is shutting down")
+        self.jobs.cancel("the driver is shutting down; start it again")
 
     def restarted(self, role: Role) -> None:
         """Configure a restarted board again, and end what the restart has interrupted.

@@ -179,7 +179,7 @@ class Jobs:
         if job is None or self._request is None or answer.word is not self._request.word:
             return
         if isinstance(reply, Fail):
-            self._finish(False, f"the controller answers: {reply.reason or 'fail'}")
+            self._finish(False, f"the controller answers: {reply.reason or 'fail'}; call again")
         elif reply.form is Form.FILE:
             self._name, self._size = reply.file
             self._piece_s = now + QUIET_S
@@ -212,7 +212,7 @@ class Jobs:
         if self.job is not Job.DOCK or not self.moving:
             return
         if isinstance(reply, Fail):
-            self._finish(False, f"the controller answers: {reply.reason or 'fail'}")
+            self._finish(False, f"the controller answers: {reply.reason or 'fail'}; call again")
         else:
             self._finish(
                 True,
