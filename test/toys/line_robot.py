@@ -3,12 +3,15 @@
 """The simulated robot of the toy board with two serial lines."""
 
 import argparse
+import re
 
 from omnibot_driver.simulator.common.board import Channel, Packet
 
 TITLE = "toy of two lines"
 CHANNELS = (Channel("drive"), Channel("sense", "sense_port"))
 TICK_S = 0.01
+SET_POINT = re.compile(rb"v -?\d+ -?\d+")
+"""A line that the robot obeys. It ignores all others, as a real board does."""
 
 
 class LineRobot:
@@ -25,9 +28,9 @@ class LineRobot:
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
         *lines, self._held = (self._held + data).split(b"\n")
-        for words in filter(None, map(bytes.split, lines)):
-            self.heard.append(b" ".join(words))
-            self.left, self.right = int(words[1]), int(words[2])
+        for line in filter(SET_POINT.fullmatch, lines):
+            self.heard.append(line)
+            self.left, self.right = map(int, line.split()[1:])
 
     def advance(self) -> list[Packet]:
         self.tick += 1
