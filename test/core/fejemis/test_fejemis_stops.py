@@ -154,6 +154,22 @@ def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
         bench.drive()
 
 
+def assert_the_estop_is_the_answer_and_the_pause_continues(
+    bench: Bench, answer: RequestDone, mark: float
+) -> None:
+    """Check the failed answer, release the e-stop, and check that only ~/start ends the pause.
+
+    Since ``mark``, a time in s, no ``start`` may have been sent.
+    """
+    assert not answer.success
+    assert "release it with ~/estop" in answer.message
+    bench.estop(False)
+    bench.run(2.0)
+    assert "start" not in bench.lines(DRIVE, mark)
+    assert bench.session.state == "paused"
+    assert bench.ask(Request.START).success
+
+
 def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() -> None:
     """The robot is paused and the e-stop is latched when the user calls ~/start.
 
@@ -164,14 +180,8 @@ def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() 
     bench.estop(True)
     mark = bench.now
     answer = bench.ask(Request.START)
-    assert not answer.success
-    assert "release it with ~/estop" in answer.message
     assert bench.now - mark < 0.1
-    bench.estop(False)
-    bench.run(2.0)
-    assert "start" not in bench.lines(DRIVE, mark)
-    assert bench.session.state == "paused"
-    assert bench.ask(Request.START).success
+    assert_the_estop_is_the_answer_and_the_pause_continues(bench, answer, mark)
 
 
 def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None:
@@ -188,14 +198,7 @@ def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None
     bench.estop(True)
     bench.run(0.1)
     (answer,) = (e for e in bench.events if isinstance(e, RequestDone) and e.token is token)
-    assert not answer.success
-    assert "release it with ~/estop" in answer.message
-    mark = bench.now
-    bench.estop(False)
-    bench.run(2.0)
-    assert "start" not in bench.lines(DRIVE, mark)
-    assert bench.session.state == "paused"
-    assert bench.ask(Request.START).success
+    assert_the_estop_is_the_answer_and_the_pause_continues(bench, answer, bench.now)
 
 
 def test_a_start_of_a_driven_robot_interrupts_its_motion_only_for_a_moment() -> None:

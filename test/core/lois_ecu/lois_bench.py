@@ -10,6 +10,7 @@ from any_board import AnyBench, LoisRobot
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.events import Extra
+from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.odometry.estimator import OdometrySettings
@@ -48,6 +49,12 @@ class Bench(AnyBench):
         before = len(self.answers)
         self.run_until(lambda: len(self.answers) > before)
         return self.answers[-1]
+
+    def record(self, kind: RecordKind, samples: int) -> None:
+        """Request a record."""
+        board = self.session.board
+        assert isinstance(board, LoisEcuBoard)
+        board.record(kind, samples)
 
     @property
     def answers(self) -> list[RequestDone]:

@@ -51,9 +51,7 @@ def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
     """
     bench = Bench(firmware)
     bench.drive_on(0.6, 1.0)
-    board = bench.session.board
-    assert isinstance(board, LoisEcuBoard)
-    board.record(RecordKind.RPM, 50)
+    bench.record(RecordKind.RPM, 50)
     while not told(bench, RecordComes):
         bench.drive(0.6)
         bench.run(TICK_S)
@@ -196,9 +194,7 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
     """
     bench = Bench(firmware, LoisEcuSettings(ticks_per_revolution=120), steps=120)
     bench.drive_on(0.6, 2.0)
-    board = bench.session.board
-    assert isinstance(board, LoisEcuBoard)
-    board.record(RecordKind.RPM, 1024)
+    bench.record(RecordKind.RPM, 1024)
     while not told(bench, RecordReading):
         bench.drive(0.6)
         bench.run(0.05)

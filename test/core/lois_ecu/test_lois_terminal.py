@@ -278,9 +278,7 @@ def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
     the board is connected.
     """
     bench = Bench("firmware")
-    board = bench.session.board
-    assert isinstance(board, LoisEcuBoard)
-    board.record(RecordKind.TORQUE, 60)
+    bench.record(RecordKind.TORQUE, 60)
     bench.run(0.5)
     configure(bench, LoisEcuSettings(drive_mode="duty"))
     bench.run(8.0)
