@@ -73,6 +73,8 @@ class Translation:
         self.last_ticks_at_s = -math.inf
         self.ticked_at_s = -math.inf
         """Time in s of the last report in which a count of ticks had changed."""
+        self._reset_until_s: float | None = None
+        """Time in s until which counts may be from before a reset. None if no reset was sent."""
         self._connect()
 
     @property
@@ -97,19 +99,21 @@ class Translation:
         unknown."""
         self._clock = (0, 0, 0)
         self._gps_works = False
-        self._reset_until_s: float | None = None
-        """Time in s until which counts may be from before a reset. None if no reset was sent."""
 
     def connect(self) -> None:
         """Begin a new connection."""
-        self._connect()
-        self.odometry.connect()
-        self.headings.forget()
+        self._begin_counts()
+        self._reset_until_s = None
 
     def reset(self) -> None:
         """Begin new counts, because a reset is sent. Counts from before it may still arrive."""
-        self.connect()
+        self._begin_counts()
         self._reset_until_s = math.inf
+
+    def _begin_counts(self) -> None:
+        self._connect()
+        self.odometry.connect()
+        self.headings.forget()
 
     def readings(
         self,
@@ -135,9 +139,7 @@ class Translation:
         match report:
             case Ticks():
                 if self._was_reset(report, read_s):
-                    until_s = self._reset_until_s
-                    self.connect()
-                    self._reset_until_s = until_s
+                    self._begin_counts()
                 restarted = self._watch(report, clock_unit, now)
                 self._late_s = self._time.late_s(report.time_counts, self._unit, now)
                 odometry.estimates.late_stddev_s = self._time.stddev_s
