@@ -16,8 +16,11 @@ from omnibot_driver.parameters import Parameter
 LIMITED = [parameter for parameter in PARAMETERS.rows if parameter.low is not None]
 VECTORS = [parameter for parameter in LIMITED if parameter.is_list]
 RANGED = [parameter for parameter in LIMITED if not parameter.is_list]
-FLOATS = [parameter for parameter in RANGED if parameter.kind is float]
-WHOLE = [parameter for parameter in FLOATS if math.floor(parameter.high) >= parameter.low]
+WHOLE = [
+    parameter
+    for parameter in RANGED
+    if parameter.kind is float and math.floor(parameter.high) >= parameter.low
+]
 """Float parameters with an integer in their range."""
 CHOICES = [row for row in PARAMETERS.rows if row.choices and not row.is_list]
 FRAMES = [parameter for parameter in PARAMETERS.rows if parameter.name.endswith("_frame")]
