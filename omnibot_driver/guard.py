@@ -10,7 +10,7 @@ Usage: ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets as
 between two heartbeats.
 """
 
-import _signal as signal  # type: ignore[import-not-found]  # ``signal`` itself brings ``enum``
+import _signal as signal  # type: ignore[import-not-found]  # ``signal`` imports ``enum``
 import errno
 import os
 import select
@@ -26,8 +26,8 @@ END = b"\n"
 BYE = b"!"
 """Message that ends the guard. The driver sends it after it has stopped the robot itself."""
 WRITTEN = b"w"
-"""Message directly before the end of input. The driver ends in order, and has written its own last
-packets. They may still wait in the kernel, so the guard must not discard them."""
+"""Message directly before the end of input, from a driver that has written its last packets itself.
+These packets may still wait in the kernel, so the guard must not discard the kernel's output."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20
@@ -90,7 +90,7 @@ def speak(last_words: Words, until: list[int], drop: bool) -> None:
     """Write the stop command 20 times. End earlier if ``until`` has input or all lines are lost.
 
     ``until``: descriptors. Input from the driver shows that the driver runs again, and can stop the
-    robot itself. ``drop``: whether to discard first what the driver has written.
+    robot itself. ``drop``: whether to discard the driver's unsent output first.
     """
     lines = {line for line, _ in last_words}
     for line in lines if drop else ():
@@ -104,7 +104,7 @@ def speak(last_words: Words, until: list[int], drop: bool) -> None:
                 drop_what_waits(line)
             except OSError as error:
                 if error.errno in GONE:
-                    lines.discard(line)  # otherwise only a datagram was lost; the next may arrive
+                    lines.discard(line)  # after other errors, the next datagram may arrive
         if not lines or select.select(until, [], [], PACE_S)[0]:
             return
 

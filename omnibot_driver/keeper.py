@@ -42,7 +42,8 @@ class Keeper:
     """The guard process for a set of open lines, from construction until ``end``.
 
     * ``descriptors``: file descriptor of each line, by channel. None if the line is not open.
-    * ``stop``, ``emergency_stop``: packets that the guard sends without and with a latched e-stop.
+    * ``emergency_stop``: packets that the guard sends if the e-stop is latched.
+    * ``stop``: packets that the guard sends otherwise.
     """
 
     def __init__(
@@ -87,7 +88,7 @@ class Keeper:
         try:
             os.write(process.stdin.fileno(), message)
             self._ahead += len(message)
-        except OSError:  # it ended or does not read: a new guard gets these commands
+        except OSError:  # the guard ended or hangs; the next one gets these commands
             self._give_up(process)
 
     def end(self, *, stopped: bool, written: bool = False) -> None:
@@ -109,7 +110,7 @@ class Keeper:
                 process.wait(max(0.0, until - time.monotonic()))
 
     def _beat(self, process: subprocess.Popen[bytes], word: bytes) -> str:
-        """Send this guard a heartbeat; if it died or hangs, give it up and return the reason."""
+        """Send this guard a heartbeat. If the guard died or hangs, kill it; return the reason."""
         assert process.stdin is not None
         pipe = process.stdin.fileno()
         try:

@@ -31,18 +31,18 @@ JOIN_TIMEOUT_S: Final = 3.0
 The reader thread may itself wait for the guard process: 2.5 s, until it kills a guard that hangs.
 Only a guard in an uninterruptible sleep takes longer."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest; longer for a slow
-board."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
+driver waits longer."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard process can
 repeat Stop afterwards. It replaces the shorter ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
-"""Longest wait at shutdown, in s, for a second proof that the robot is at rest; longer for a slow
-board. The driver sends nothing during this wait. So the second proof shows that the last Stop was
-not damaged on the line: a damaged one might move the robot."""
+"""Longest wait at shutdown, in s, for a second proof that the robot is at rest. For a slow board,
+the driver waits longer. The driver sends nothing during this wait. So the second proof shows that
+the last Stop was not damaged on the line: a damaged Stop might move the robot."""
 BOTH_PROOFS_S: Final = 2.4
-"""Longest sum of both waits, in s, however slow the board is. The process ends itself after
-``driver.LONGEST_END_S``. Before that, the guard needs time to repeat Stop if there is no proof."""
+"""Longest sum of both waits, in s, even for a slow board. The process ends itself after
+``driver.LONGEST_END_S``. If there is no proof, the guard needs part of this time to repeat Stop."""
 
 T = TypeVar("T")
 
@@ -188,7 +188,7 @@ class Link:
 
     @property
     def stands(self) -> bool:
-        """Whether the board has shown, by the end of ``close``, that the robot is at rest."""
+        """Whether ``close`` sent Stop, and measurements proved that the robot is at rest."""
         return self._shared.stood
 
     def _stop_for_good(self) -> None:

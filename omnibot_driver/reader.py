@@ -141,7 +141,7 @@ class Reader:
                 if not data:
                     continue
                 now = time.monotonic()
-                if self._shared.heed_stall():  # before these bytes, which have waited meanwhile
+                if self._shared.heed_stall():  # before these bytes, which waited in the stall
                     self._shared.settle()
                 self._wait_s = self.reconnect_interval_s
                 self.received_bytes += len(data)
@@ -197,7 +197,8 @@ class Reader:
                     self._shared.told = told and self._session.shutdown.owed
             else:  # write Stop directly after the bytes that can no longer be discarded
                 port.write_if_room(self._session.shutdown.broken_off())
-            lines = len(port.descriptors or ())  # one of several may still be open and need a stop
+            # One of several lines may still be open. It then needs a stop.
+            lines = len(port.descriptors or ())
             written = self._closing.is_set() and self._shared.write_error is None
             stopped = self._shared.stood if self._closing.is_set() else comes_back and lines < 2
             keeper, self._shared.port, self._shared.keeper = self._shared.keeper, None, None

@@ -33,7 +33,7 @@ class SharedSession:
 
     Only ``call``, ``command`` and ``blocked`` may be used without holding ``lock``.
 
-    * ``changed``: condition of this lock, on which the pacer and the shutdown wait.
+    * ``changed``: condition variable of this lock. The pacer and the shutdown wait for it.
     * ``keeper``: the object that runs the guard process. None without a guard.
     * ``write_error``: the error after which nothing more is written, or None.
     """
@@ -58,13 +58,13 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop was written to every line when the link ended.
+        """Whether the link wrote its last Stop to every line.
 
-        If the port was lost at that time, the reader opens it again and writes Stop. After that,
-        ``told`` is True only if the robot had to be stopped (``Shutdown.owed``).
+        If the port is lost when the link ends, the reader opens it again and writes Stop. ``told``
+        then becomes True only if the robot may still have been moving (``Shutdown.owed``).
         """
         self.stood = False
-        """Whether measurements showed the robot at rest when the link ended."""
+        """Whether Stop was sent and measurements showed the robot at rest when the link ended."""
         self.closing = threading.Event()
         """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write

@@ -67,7 +67,8 @@ class StallDetector:
         """
         if self._begun:
             self._begun = False
-            if now >= self._over_at + LATEST_S:  # else commands from that stall may still arrive
+            # If commands from the previous stall may still arrive, the start of that stall is kept.
+            if now >= self._over_at + LATEST_S:
                 self._from_ns = _ns(self._passed_at - LATEST_S)
             self._over_at = now
             self._until_ns = _ns(now + SETTLE_S)

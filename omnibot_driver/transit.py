@@ -27,11 +27,11 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
 rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which a message that seems too early fits a sender worse than one that is late: 1 s too
-early fits as badly as 10 s too late. A message is assigned to the sender that it fits best."""
+"""Weight of the misfit of a message that seems too early for a sender: 1 s too early fits as badly
+as 10 s too late. A message is assigned to the sender that it fits best."""
 ALIKE_S: Final = 0.02
-"""Difference in s between two misfits that does not distinguish two senders. If a message fits
-several senders, it is assigned to the one whose last number is the nearest below its own."""
+"""Two senders fit a message equally well if their misfits differ by at most this time, in s. The
+message is then assigned to the sender with the higher last message number."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender is regarded as known. Before that, perhaps
@@ -150,11 +150,11 @@ class _Sender:
         return number is None or self.number is None or self.number < number
 
     def misfit_s(self, differences_s: Differences, at_s: float) -> tuple[float, float]:
-        """Return how badly the message fits this sender, as a delay in s; 0 fits exactly.
+        """Return the smallest and the largest possible misfit of a message to this sender, in s.
 
-        The two values are the smallest and the largest possible ones, because the clocks drift. If
-        a message is too early, the result is the time by which it is too early, multiplied by ten
-        (``CLOCK_RETREATS``).
+        The misfit is the time by which the message is too late for this sender; 0 fits exactly. If
+        the message is too early, the misfit is ten times (``CLOCK_RETREATS``) the time by which it
+        is too early. The exact misfit is unknown, because the clocks drift.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
@@ -186,7 +186,7 @@ class _Offset:
         return difference_s - self._least_s - self._drift_s(at_s)
 
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest misfit, as ``_Sender.misfit_s`` explains them."""
+        """Return the smallest and the largest possible misfit, as ``_Sender.misfit_s`` does."""
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS
         return weight * max(0.0, abs(excess_s) - drift_s), weight * (abs(excess_s) + drift_s)
