@@ -3,7 +3,8 @@
 """Serialise measurements to CDR, the format of DDS messages, and parse velocity commands from CDR.
 
 CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write CDR quickly. At each
-start, ``difference`` compares these bytes with the bytes that rclpy writes on this machine.
+start, ``difference`` compares the bytes from ``Serializer`` with the bytes that rclpy writes on
+this machine.
 """
 
 import itertools

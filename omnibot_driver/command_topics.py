@@ -35,7 +35,7 @@ def obeying(
     * ``may_be_old``: returns True for a message whose time in transit does not matter.
     * ``is_stop``: returns True for a command to stop, which is obeyed even if it is old.
     * ``ends_goal``: returns True for a command that ends a drive to a goal even if it is refused.
-      It may raise CommandRefused for an invalid message.
+      The function may raise CommandRefused for an invalid message.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()
@@ -61,7 +61,8 @@ def obeying(
             link.command(obey, message, sent_ns, moves_base=moves_base)
         except CommandRefused:
             with contextlib.suppress(CommandRefused):
-                if ends_goal(message):  # a goal does not expire, and this may be the only message
+                # A goal does not expire, and the sender may not repeat this message.
+                if ends_goal(message):
                     link.call(Session.end_goal)
 
     return callback

@@ -75,7 +75,7 @@ class Ending:
 
     @property
     def begun(self) -> bool:
-        """Whether the driver must already end: a signal came, or ``begin`` was called."""
+        """Whether a signal came or ``begin`` was called, so that the driver must end."""
         return bool(select.select([self._wakes], [], [], 0)[0])
 
     def wait(self) -> None:
@@ -94,9 +94,10 @@ def main(args: list[str] | None = None) -> int:
         with UnblockedOutput():
             print(HELP)
         return 0
-    # The import takes half a second. ``ending`` exists before it, so a signal during the import
-    # ends the driver. If RMW_IMPLEMENTATION is wrong, ROS says so and ends the process in the
-    # import. The pipe of UnblockedOutput would lose this text.
+    # The import takes half a second. ``ending`` is created first, so that a signal during the
+    # import ends the driver. If RMW_IMPLEMENTATION is wrong, ROS prints an error and ends the
+    # process during the import. UnblockedOutput begins after the import, because its pipe would
+    # lose this error text.
     ending = Ending()
     with contextlib.suppress(ImportError):
         import rclpy._rclpy_pybind11  # noqa: F401
@@ -120,7 +121,7 @@ def in_plain_words(text: str) -> str:
 
 
 def too_large(domain: str) -> bool:
-    """Return whether Fast DDS would end the process without a message because of this domain."""
+    """Return whether Fast DDS would end the process silently, because this domain is too large."""
     return domain.isdecimal() and int(domain) > LARGEST_DOMAIN
 
 
@@ -186,8 +187,8 @@ def _run(ending: Ending, args: list[str]) -> None:
     ending.wait()
     _set_deadline()
     driver.close()
-    # The executor runs its newest task first. So the services that waited for the board, and have
-    # now a result, run after the outer task and before the inner one.
+    # The executor runs its newest task first. The services that waited for the board now have a
+    # result. They run after the outer task and before the inner one, so they still answer.
     executor.create_task(lambda: executor.create_task(stopping.set))
     spinner.join(timeout=0.5)
     stopping.set()  # for a callback that hangs and returns later

@@ -273,9 +273,9 @@ def time_message(nanoseconds: int) -> Time:
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
     """Return wall clock minus steady clock, in ns.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. ``known_ns`` is
-    the previous result. It is returned again if it agrees with these readings, so that the result
-    does not vary with the duration of the readings.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. These times give
+    two limits of the result. ``known_ns`` is the previous result. It is returned again if it is
+    within the limits, so that the result changes rarely. Otherwise the nearer limit is returned.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

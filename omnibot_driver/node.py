@@ -97,8 +97,8 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        With these callbacks, the executor would handle each command later, because it checks all of
-        them first.
+        The executor checks these callbacks before it handles a command, so they would delay each
+        command.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
@@ -178,7 +178,7 @@ class OmniBotDriver(Node):
 
         def configure(session: Session, now: float) -> None:
             session.configure(settings, now, board=board)
-            if bias:  # even if unchanged: the bias may have been refined since then
+            if bias:  # even if unchanged: the session may have refined its own bias
                 session.gyro_bias = settings.imu.gyro_bias
 
         self._link.call(configure)

@@ -37,14 +37,15 @@ RAW_DEPTH: Final = 1000
 byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Time of a simulated clock, in ns, from which on measurements are not published. It is a minute
-before the latest time that a stamp can express, so that a stamp can be later than the clock."""
+"""Time of a simulated clock, in ns. From this time on, measurements are not published. It is a
+minute before the latest time that a stamp can express, because a stamp may be later than the
+clock."""
 
 
 class Publishing:
     """The publisher of measurements, states and notices of one driver.
 
-    ``settings``, which all messages are made with, may be replaced at any time.
+    The attribute ``settings`` applies to all messages. It may be replaced at any time.
     """
 
     def __init__(
@@ -249,9 +250,10 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text is new since the board last began to send valid data.
+        """Return whether this text is new since the last change of state, and remember the text.
 
-        Repeated losses of a port are therefore logged only once.
+        Changes to disconnected or connecting are not counted. So if a port is lost repeatedly, and
+        the board sends no valid data in between, each text is logged only once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

@@ -80,7 +80,7 @@ def prefix_advice(prefix: str) -> str:
 
 
 def unread_files(arguments: Sequence[str], node: str) -> list[str]:
-    """Return a warning for each parameter file of which ROS reads nothing for this node.
+    """Return a warning for each parameter file that has no parameters for this node.
 
     ``arguments``: the command line. ``node``: the node's full name, such as /robot1/omnibot_driver.
     """

@@ -47,7 +47,7 @@ class Recorder:
         self.publish: dict[type, Callable[[Any, int], None]] = {
             RecordReading: self._on_record,
             RecordFailed: self._on_failed,
-            RecordComes: lambda _comes, _stamp_ns: None,  # shows only that the board sends
+            RecordComes: lambda _comes, _stamp_ns: None,  # shows only that a record arrives
         }
         waiting = ReentrantCallbackGroup()
         for kind in RecordKind:

@@ -60,8 +60,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""For some common parameters: the function that returns whether a board with given traits has the
-parameter. Other common parameters do not depend on the traits."""
+"""Functions by the name of a common parameter. Each returns whether a board with given traits has
+the parameter. Common parameters without a function do not depend on the traits."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

@@ -63,9 +63,9 @@ class Transport(Protocol):
         """
 
     def write(self, packets: Packets) -> None:
-        """Write all packets; discard packets for a missing line.
+        """Write all packets. Data that a missing line does not accept at once are discarded.
 
-        Raises LinkError if a line is lost. The unsent bytes of this line are discarded.
+        Raises LinkError if the connection is lost. Its unsent bytes are then discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -131,8 +131,7 @@ class Several:
         """Write each packet to its line. Bytes that a line does not accept at once are sent later.
 
         If a line has had waiting bytes for 0.2 s without a break, the bytes are discarded, and the
-        line is regarded as missing. A line that is missing already gets only the bytes that it
-        accepts at once.
+        line is regarded as missing. A missing line gets only the bytes that it accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -169,7 +168,7 @@ class Several:
     def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
         """Yield each line once, with the joined bytes of all packets for this line.
 
-        A line whose first packet comes earlier is yielded earlier.
+        The lines are in the order of their first packets.
         """
         for channel in dict.fromkeys(channel for channel, _ in packets):
             own = tuple(packet for packet in packets if packet[0] == channel)
@@ -203,7 +202,7 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write the waiting bytes. ``poll`` then reports when a line accepts those that still wait.
+        """Write the waiting bytes. If some still wait, ``poll`` reports when the line accepts them.
 
         A line that has not accepted all of them for 0.2 s (``WRITE_TIMEOUT_S``) is regarded as
         missing.
@@ -236,7 +235,8 @@ class Several:
     def _close(self, line: "Line") -> None:
         with self._writing:
             port = line.end()
-        if port is not None:  # without the lock, as this may wait for the kernel's output
+        # The lock is released, because ``close`` may wait until the kernel has sent its output.
+        if port is not None:
             port.close()
 
     def _require_one(self) -> None:
