@@ -132,7 +132,7 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        Even then, a running board accepts a command for a standstill.
+        A command to stand still is never refused for this reason while the board runs.
         """
         return ""
 
@@ -167,9 +167,9 @@ class Board(Protocol):
         return []
 
     def discard(self) -> None:
-        """Discard the bytes that wait for later ones, because a long silence has followed them.
+        """Discard the bytes that are held for decoding, because a long silence has followed them.
 
-        Otherwise a reading from them would get the time of the later bytes.
+        A reading that later bytes complete would get the arrival time of those bytes.
         """
         return
 
@@ -228,7 +228,7 @@ class Board(Protocol):
         """
 
     def start_requested(self) -> None:
-        """Record that the user has requested a start. If it can start, ``start`` follows.
+        """Record that the user has requested a start. If possible, ``start`` is called next.
 
         Not called for the driver's own starts, e.g. after a reconnect.
         """

@@ -126,7 +126,8 @@ class Inbound:
 def _show_life(readings: Sequence[Reading]) -> bool:
     """Return whether readings that came without new bytes show that the board is alive.
 
-    OdometryReadings, NoticeReadings and results of requests do not: they can follow from time.
+    OdometryReadings, NoticeReadings and results of requests do not show that, because they can
+    follow from elapsed time alone.
     """
     for reading in readings:
         content = reading.content if isinstance(reading, ExtraReading) else reading

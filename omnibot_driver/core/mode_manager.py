@@ -164,9 +164,9 @@ class ModeManager:
             self._reset(now)
 
     def give_up_start(self) -> bool:
-        """Return whether a ~/start is open that the board refuses. If so, fail it.
+        """Fail an open ~/start request if the board refuses it; return whether this happened.
 
-        The mode from before this ~/start is wanted again.
+        The mode that was wanted before the request is then wanted again.
         """
         refusal = self._board.start_refusal
         if self._request is not Request.START or self._board.mode.running or not refusal:
@@ -188,7 +188,7 @@ class ModeManager:
         if self.phase is Phase.PAUSING:
             self._shown_at = now
         elif self.phase is Phase.RESETTING and in_flight:
-            self._may_have_restarted |= restarted  # the next notice proves it by its number
+            self._may_have_restarted |= restarted  # the next notice confirms the restart
         elif self.phase is Phase.RESETTING and not (restarted or self._may_have_restarted):
             self._reset(now)
         elif self.phase is Phase.RESETTING:

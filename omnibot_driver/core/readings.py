@@ -41,9 +41,10 @@ class DisplacementReading:
     * ``duration_s``: length of this time, in s; None if unknown, e.g. after a pause.
     * ``lost``: number of missing displacements before this one.
     * ``restarted``: whether the board's counters and earth frame seem to start again here.
-    * ``measured``: False if the board only reports the commanded values.
-    * ``possible``: False if the robot cannot move so fast. The board's own odometry may have been
-      corrected.
+    * ``measured``: False if the values are not a valid measurement, e.g. if the board only reports
+      the commanded values.
+    * ``possible``: False if the robot cannot move so fast. The cause may be a correction of the
+      board's own odometry.
     """
 
     dx_m: float
@@ -131,7 +132,7 @@ class ResetReading:
 class NoticeReading:
     """A notice for the user.
 
-    * ``text``: a sentence; empty if the user already has it.
+    * ``text``: a sentence; empty if there is nothing new to report.
     * ``halt``: whether the robot must be stopped.
     """
 

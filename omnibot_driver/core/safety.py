@@ -154,7 +154,7 @@ class SafetyStops:
         self.react(self._measurement.release(), now)
         self._board.discard()
         self._measurement.restart()
-        self._reporter.silent(  # a board that loses power leaves a partial frame
+        self._reporter.silent(  # the bytes of a frame cut by a power loss do not count
             liveness.silence_s,
             bytes_came=liveness.came_at - liveness.heard_at > liveness.silence_s / 2,
         )

@@ -215,9 +215,10 @@ class Session:
         self._command(self._commanding.pose(goal), now)
 
     def end_goal(self, now: float) -> None:
-        """End a drive to a goal, because a zero ``cmd_vel`` arrived but was refused, e.g. as late.
+        """End a drive to a goal: a zero ``cmd_vel`` was refused, e.g. because it was too old.
 
-        This has no effect on a velocity, which expires by itself and may be newer than the zero.
+        This has no effect on a velocity: a velocity expires by itself, and may be newer than the
+        zero ``cmd_vel``.
         """
         self._reporter.notify(self._commanding.end_goal(now))
 

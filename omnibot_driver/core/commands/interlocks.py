@@ -50,8 +50,8 @@ class Interlocks:
         """Record that a motion command was refused, so that its sender is known to be active.
 
         The motion interlock may wait until no command has arrived for some time. A refused command
-        makes this wait begin again. Call this for every refused command, also if another check has
-        refused it.
+        makes this wait begin again. Call this for every refused command, even if the refusal did
+        not come from this class.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 

@@ -11,8 +11,8 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Longest time, in s, between two stops by the motion monitor that probably have the same cause.
-After the second, the user must act before motion is accepted again."""
+"""Two stops by the motion monitor within this time, in s, are assumed to have the same cause. After
+the second stop, the user must act before motion is accepted again."""
 
 
 class Until(Enum):
@@ -51,7 +51,7 @@ class MotionInterlock:
         self._tripped_at = now
 
     def start(self) -> None:
-        """End the refusal, because the user has called ~/start."""
+        """End any refusal, for example because the user has called ~/start."""
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
@@ -71,10 +71,11 @@ class MotionInterlock:
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
         """Record that a sender of commands was active at ``now``.
 
-        A wait for ``timeout_s`` without commands begins again here, unless it is over (``expire``).
-        Call this when a command is refused, and after a stall of this process.
+        A refusal after a first stop ends after ``timeout_s`` without commands. If this time is not
+        over yet, it begins again at ``now``. Call this when a command is refused, and after a stall
+        of this process.
 
-        ``stalled_s``: length of this stall. It does not count as time without commands.
+        ``stalled_s``: length of the stall, in s. A stall does not count as time without commands.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now

@@ -102,8 +102,8 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        If that is impossible, the robot is stopped. A command to stand still is dropped if it would
-        become a motion, because the rules for motions were not applied to it.
+        If that is impossible, the robot is stopped. With the new settings, a command to stand still
+        may become a motion. Such a command is dropped, because it was not checked as a motion.
         """
         current = self.policy.current
         if current is None:
@@ -250,8 +250,8 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only a discarded goal gives a notice, because a goal is sent only once. The sender of a
-        velocity repeats the command, and sees the refusal.
+        Only a discarded goal gives a notice, because a goal is sent only once. A velocity is sent
+        repeatedly, and the refusal of the next command is reported.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)

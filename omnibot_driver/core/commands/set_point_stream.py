@@ -99,8 +99,8 @@ class SetpointStream:
         """Record that the packets of a request were written, and adapt what to send next.
 
         The board may hold an incomplete motion frame, whose last bytes were lost. Packets other
-        than Stop can complete this frame to a wrong motion. Stop ends the motion in effect. So a
-        set-point that is a motion is repeated at once.
+        than Stop can complete this frame to a wrong motion. Stop ends the motion in effect. So the
+        set-point is sent again at once, except a zero set-point after Stop.
         """
         if self._heard is not None:
             self._heard(packets, now)

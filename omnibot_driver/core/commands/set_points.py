@@ -65,8 +65,8 @@ class BaseSetpoint:
 
     * ``is_zero``: as an attribute, whether the order makes the robot stand still. As an argument,
       the function that returns this; it may raise CommandRefused.
-    * ``before``: the previous set-point. If it is a body velocity, the ramp starts at it, otherwise
-      at rest.
+    * ``before``: the previous set-point. If it is a body velocity, the ramp starts at the velocity
+      that its own ramp has reached, otherwise at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 

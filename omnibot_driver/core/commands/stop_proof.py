@@ -27,7 +27,8 @@ AT_LEAST: Final = 2
 A single displacement could be damaged, or could have been measured before the wheels turned.
 """
 PROOFS: Final = 2.0
-"""Shortest wait for a proof, as a multiple of the duration of standstill that a proof needs."""
+"""Factor for the shortest wait for a proof: the wait is this factor times ``still_s``, the
+duration of standstill that proves a stop."""
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 

@@ -46,7 +46,7 @@ corrected in 14 s."""
 
 
 class Look:
-    """One observation of the robot: readings of the IMU, and displacements of the same time.
+    """One observation of the robot: readings of the IMU, and displacements in the same period.
 
     * ``began_s``, ``last_s``: stamps of the first and the last reading, in s; NaN without
       readings.

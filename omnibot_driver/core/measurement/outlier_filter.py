@@ -38,8 +38,8 @@ STILL: Final = 0.08
 """An implausible change of the IMU's readings was a spike only if at most this fraction of the
 change remains in the next reading.
 
-The fraction has a second use: only one of a reading's values is regarded as changed if each of the
-others changes by at most this fraction of the largest change.
+The fraction has a second use. If all other values of the reading change by at most this fraction of
+the largest change, only the value with the largest change is regarded as changed.
 """
 END_OF_SCALE: Final = 0.99996
 """A reading of at least this fraction of the accelerometer's full scale is regarded as at the end
@@ -90,7 +90,8 @@ class OutlierFilter:
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. If so, an impossible but finite
-      displacement is passed on with ``measured`` and ``possible`` False.
+      displacement is passed on with ``measured`` False. If it has a duration, ``possible`` is False
+      too.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -161,7 +162,7 @@ class OutlierFilter:
 
     def _admit_displacement(self, reading: DisplacementReading, stamp_s: float) -> list[Stamped]:
         before_s, self._displaced_at_s = self._displaced_at_s, stamp_s
-        seconds = reading.duration_s or None  # 0 s: it came with the one before
+        seconds = reading.duration_s or None  # 0 s: arrived with the previous one
         if seconds is None:
             self._motion_leaps.forget()
             seconds = None if before_s is None else (stamp_s - before_s) or None

@@ -23,9 +23,9 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. With it, lost IMU readings are counted: the board
-      has sent one reading in each period of a displacement's duration. It is None if the IMU
-      readings themselves contain the number of lost ones (``lost``).
+    * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by this
+      period, is the number of IMU readings that the board has sent in this time. The missing ones
+      are counted as lost. None if each IMU reading contains the number of lost ones (``lost``).
     """
 
     imu_period_s: float | None = None

@@ -22,10 +22,9 @@ Users measure the board's scales by hand, and controllers overshoot.
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: speeds outside the hull that are always allowed.
+"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed speeds outside the hull, in m/s and rad/s.
 
-They are in m/s and rad/s. Encoder resolution and rounding cause them, and so does a slope if the
-wheel controllers are slow.
+The causes are encoder resolution, rounding, and a slope if the wheel controllers are slow.
 """
 SIDEWAYS: Final = 0.1
 """Deviation allowed in any direction, as a fraction of the commanded speed or yaw rate.

@@ -16,8 +16,8 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s that a robot needs at most to follow a set-point. So a displacement is compared with
-all set-points that were in effect during it, or within this time before it.
+"""Longest time in s that a robot needs to follow a set-point. So a displacement is compared with
+all set-points that were in effect while it was measured, or at most this time earlier.
 
 A robot that is clearly slower than all these set-points is assumed to be held.
 """

@@ -26,10 +26,10 @@ HELD_S: Final = 0.3
 This time includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant in s with which the velocity that a replaced set-point still allows decays. The
+"""Time constant, in s, of the decay of the velocity that a replaced set-point still allows. The
 decay begins ``HELD_S`` after the replacement.
 
-It is long enough for robots with a time constant of up to 0.35 s.
+This value is long enough for robots with a time constant of up to 0.35 s.
 """
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored. By then, it allows less than 2 % of its

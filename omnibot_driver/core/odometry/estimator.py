@@ -35,7 +35,7 @@ POSE_DUE_S: Final = 0.24
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Smallest standard deviation of the heading, in rad, at which the heading counts as unknown. Only
-lost displacements add to it, until a pose of the board shows the lost motion."""
+the effect of lost displacements is included, until a pose of the board shows the lost motion."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -48,7 +48,7 @@ class OdometrySettings:
     * ``use_board_pose``: whether the board's poses correct the odometry. If not, only the initial
       heading comes from them.
     * ``fastest_mps``, ``fastest_radps``: speeds that even a pushed robot does not exceed.
-    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the board's.
+    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the reported ones.
     """
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
@@ -342,9 +342,9 @@ class Odometry:
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Assume that the last motion went on during the ``lost`` displacements before a pose.
+        """Assume that the last motion continued during the ``lost`` displacements before a pose.
 
-        It went on for ``LONGEST_BRIDGE_S`` at most.
+        The assumed motion lasts at most ``LONGEST_BRIDGE_S``.
         """
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last

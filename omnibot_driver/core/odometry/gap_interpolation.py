@@ -32,10 +32,10 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Return the tangents of the lost displacements and of ``reading``, in body axes.
+        """Return two tangents in body axes: of all lost displacements together, and of ``reading``.
 
-        A tangent is twist x time. ``heading_rad``: heading before the losses. If it is None,
-        because no pose has arrived, readings are taken to be in body axes.
+        A tangent is twist x time. ``heading_rad``: heading before the losses; None if no pose has
+        arrived. Without a heading, ``reading`` is taken to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

@@ -64,8 +64,8 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent from the robot's pose to ``place``, by the shorter turn.
 
-        A tangent is twist x time. It is as the board reports it: in the board's body axes, not yet
-        corrected by ``scale``.
+        A tangent is twist x time. Like the tangents that the board reports, the result is in the
+        board's body axes and not corrected by ``scale``.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
@@ -93,7 +93,7 @@ class PoseTracker:
 
     def correct(self, tangent: Pose) -> None:
         """Correct the pose gradually by ``tangent``, and remove the uncertainty of all gaps."""
-        if self.uncertainty.gap != NOTHING:  # otherwise it corrects only rounding
+        if self.uncertainty.gap != NOTHING:  # else the tangent is only rounding
             self.rolled += _times(tangent, self._size)
         self.follower.correct(roll(_times(tangent, self._signed_size)))
         self.uncertainty.settle()

@@ -14,9 +14,9 @@ from omnibot_driver.core.readings import Vector3
 class LinkFigures:
     """The figures of the link to the board.
 
-    * ``trouble``: why the port is not open, as a sentence; empty while open.
+    * ``trouble``: why the port is not open, as a sentence; empty while the port is open.
     * ``opened``: how often the port was opened.
-    * ``overruns``: how often the kernel lost bytes since the opening; None if not counted.
+    * ``overruns``: how often the kernel lost bytes since the port was opened; None if not counted.
     * ``waited_s``: total time for which the reader thread waited for the processor, in s; None if
       not counted.
     """
@@ -62,8 +62,8 @@ class ImuFigures:
     """The figures of the IMU.
 
     * ``gravity_mps2``, ``noise_radps``: gravity and the gyro's noise, measured at the last
-      standstill; None before the first.
-    * ``advice``: names the parameter that contradicts the measured gravity; or empty.
+      standstill; None before the first standstill.
+    * ``advice``: what to check if the measured gravity contradicts a parameter; otherwise empty.
     """
 
     bias_radps: Vector3

@@ -31,7 +31,7 @@ BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
 An adapter with a timer of 16 ms reads at five phases of a 10 ms tick. Each phase has its own delay.
-In 12 reads, each phase occurs twice, also the one with the least delay.
+In 12 reads, each phase occurs twice, including the phase with the least delay.
 """
 CALM: Final = 0.45
 """Largest difference from the fitted clock, in periods, of a read whose tick number is certain.
@@ -121,7 +121,7 @@ class DeviceClock:
             if stamp_s is not None:
                 return [stamp_s] * len(ticks)
         if not readings and (edge is None or not edge.ahead):
-            return []  # bytes outside samples say nothing about the time of the next sample
+            return []  # bytes outside samples do not show the time of the next sample
         line = self._line = self._line or ClockFit(self._period_s, (self._tick, now))
         if readings and self._cut_off:
             if isinstance(readings[0], ImuReading) and not readings[0].lost:
@@ -274,8 +274,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: upper limit, in s, for the least step from the last stamp, so that time is left
-        for the stamps of the later readings.
+        ``room_s``: this stamp's share, in s, of the time between the last stamp and the arrival.
+        The least step is limited to this share, so that time is left for later stamps.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
