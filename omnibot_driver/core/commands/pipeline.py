@@ -272,8 +272,8 @@ class CommandPipeline:
             return []
         self.policy.halt(now)
         return [
-            "the goal of cmd_pose is discarded: cmd_vel commanded the robot to stand still, in a"
-            " command that was refused"
+            "the goal of cmd_pose is discarded: cmd_vel commanded the robot to stand still; this"
+            " command was refused, but it still ends the goal"
         ]
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
