@@ -68,5 +68,5 @@ def test_without_ros_or_a_driver_it_says_so(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
     refused, absent = (line for line in done.stderr.splitlines() if "atplotlib" not in line)
     assert refused.startswith("report: ROS does not start: ")
-    assert absent.startswith("report: no driver was heard")
+    assert absent.startswith("report: no driver was found")
     assert not (tmp_path / "out").exists()

@@ -34,7 +34,7 @@ DEPTH: Final = 1000
 COMMANDS: Final = ("cmd_vel", "wheel_cmd")
 
 Progress = Callable[[int, int], None]
-"""A function that receives how many seconds of the recording have passed, and how many it takes."""
+"""A function that receives the elapsed time and the total time of the recording, in whole s."""
 
 
 def listen(
@@ -109,8 +109,9 @@ def _discover(
             if robots:
                 raise
             raise ToolError(
-                f"no driver was heard for {spent_s:.0f} s: is one running, with the same"
-                f" ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?{discovery_advice()}"
+                f"no driver was found within {spent_s:.0f} s: check that a driver runs with the"
+                " same ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as this"
+                f" program{discovery_advice()}"
             ) from error
         return robot, topics, kinds, len(robots) == 1
 

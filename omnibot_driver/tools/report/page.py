@@ -153,7 +153,7 @@ def _page(log: Log, findings: Sequence[Finding], source: str, sections: Sequence
         f"<title>OmniBot drive report</title><style>{STYLE}</style></head><body><main>"
         f'<h1>OmniBot drive report</h1><p class="about">{about}</p>'
         f'<div class="card headline {worst}">{headline(findings)}</div>'
-        '<div class="card"><table><tr><th></th><th>Of</th>'
+        '<div class="card"><table><tr><th></th><th>Subject</th>'
         "<th>What was found, and what to do</th></tr>"
         f"{rows}</table></div>{''.join(sections)}</main></body></html>\n"
     )
