@@ -33,10 +33,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand: driver parameters, and what the board lacks if the driver has none of them.
+"""For each subcommand: the names of driver parameters, and a text for the error message.
 
-The subcommand needs at least one of these parameters. If there is none, the error message names
-what the board lacks.
+The driver must have at least one of these parameters. If it has none of them, the board lacks the
+thing that the text names.
 """
 
 

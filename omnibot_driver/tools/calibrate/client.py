@@ -127,7 +127,7 @@ class Client:
         self.parameters.update(values)
 
     def restore_parameters(self, values: Mapping[str, Value]) -> None:
-        """Set parameters as ``set_parameters`` does, also after the user has pressed ctrl-C."""
+        """Set parameters as ``set_parameters`` does, even after the user has pressed ctrl-C."""
         with self._interruption.deferred():
             self.set_parameters(values)
 

@@ -2,8 +2,9 @@
 
 """``calibrate commission``: guide the user to find how motors and IMU are oriented.
 
-The user moves the robot, and answers the questions that the board's data cannot answer. If an
-answer is contradictory, the tool explains the contradiction and repeats the question.
+The tool turns the wheels; the user tilts and turns the robot by hand. The user also answers the
+questions that the board's data cannot answer. If an answer is contradictory, the tool explains the
+contradiction and repeats the question.
 """
 
 import argparse

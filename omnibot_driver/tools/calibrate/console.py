@@ -125,9 +125,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    If the uncertainty is known, all three are rounded to the decimal place of the uncertainty's
-    second significant digit. If this place is before the decimal point, they are rounded to whole
-    numbers.
+    If the uncertainty is known, it has two significant digits, and the two values have the same
+    number of decimals. If the uncertainty is 10 or more, all three are whole numbers.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

@@ -30,7 +30,7 @@ IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
 """Time without data, in s, after which the tool stops a motion."""
 CLOCKS_S: Final = 0.1
-"""Largest difference between the driver's clock and this computer's, in s.
+"""Largest accepted difference between the driver's clock and this computer's clock, in s.
 
 The tool compares the times of its commands with the timestamps in the odometry.
 """
@@ -54,7 +54,7 @@ class Listener(Client):
         self._topics: Sequence[str] = TOPICS if has_imu else (ODOMETRY,)
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
         self._delay_s = math.inf
-        """Shortest time in s from a timestamp in the odometry to its arrival, in this motion."""
+        """Shortest delay of an odometry message in this motion, from timestamp to arrival, in s."""
         self._pose, self._twist = Pose(), HALT
         self._wheel_rates: tuple[float, ...] = HALT
         if has_imu:

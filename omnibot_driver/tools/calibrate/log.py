@@ -2,8 +2,8 @@
 
 """A log of the robot's data and commands in one motion, or in one recording without commands.
 
-Times are sampling times in s, by ROS's clock. This module knows rows and columns of numbers; it
-does not know ROS.
+All times are in s, by ROS's clock: the sampling times of data, and the sending times of commands.
+This module knows rows and columns of numbers; it does not know ROS.
 """
 
 from collections.abc import Sequence

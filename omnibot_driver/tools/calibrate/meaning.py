@@ -78,7 +78,7 @@ def drift(odometry: Odometry, begin_s: float, end_s: float) -> Drift:
 
 
 def require_motion(odometry: Odometry) -> None:
-    """Raise ToolError if the robot has moved by less than 1 mm along both x and y."""
+    """Raise ToolError if the robot's x and y have each changed by less than 1 mm."""
     if not len(odometry.pose) or np.ptp(odometry.pose[:, :2], axis=0).max() < LEAST_M:
         raise ToolError(
             "the robot does not move when commanded: check the motors' power, and what the driver"

@@ -2,8 +2,9 @@
 
 """``calibrate geometry`` and ``calibrate scale`` for a base that only drives straight and turns.
 
-The result is ``metres_per_count`` if the driver has it, else the odometry's scales. This module
-knows drives and readings; it does not know the base's wheels.
+If the driver has the parameter ``metres_per_count``, the tool finds ``metres_per_count``,
+``linear_scale`` and ``motor_balance``. Otherwise, the tool finds the scales of the odometry. This
+module knows drives and readings; it does not know the base's wheels.
 """
 
 import argparse

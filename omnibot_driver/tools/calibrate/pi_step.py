@@ -3,7 +3,7 @@
 """``calibrate step`` for a board that records encoder ticks and accepts gains.
 
 1. Record steps with the current gains.
-2. At a constant duty, find how unequal the two levels of each encoder's signal are.
+2. At a constant duty, find how much the two levels of each encoder's signal differ in duration.
 3. Fit each plant (motor with wheel) to starts at full duty.
 4. In several rounds, compute gains, record steps, and fit the dead time for the next round.
 """
@@ -111,9 +111,9 @@ def _require_full_duty(parameters: Mapping[str, Any]) -> None:
 
 
 class _Bench:
-    """The robot on a box: it sets parameters and records the wheels.
+    """Sets parameters, and records the wheels of the robot, which is on a box.
 
-    ``show``: called after each record with the number of records.
+    ``show``: called after each record with the number of records so far.
     """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:

@@ -248,7 +248,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with their onsets moved to the ticks that fit the model best.
 
-    The onset is late if a busy computer delayed the command.
+    If a busy computer delayed a command, the true onset is later than the computed onset.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

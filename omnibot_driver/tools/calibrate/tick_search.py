@@ -47,7 +47,7 @@ LAGS: Final = 60
 Even such distant residuals are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
-"""Sum of the relative errors of two successive times above which the board has missed a mark.
+"""If the relative errors of two successive times sum to more than this, the board missed a mark.
 
 A missed mark doubles the first time. Its error is then 1, and so is the sum. The board's clock can
 lose up to 6 ms, which makes the sum smaller. If the board only noticed a mark late, the first time
@@ -162,8 +162,8 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        All later searches regard the time between the marks before and after a missed mark as the
-        time of two distances between marks.
+        If the board missed a mark, the time at that place covers two distances between marks. All
+        later searches take this into account.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):

@@ -27,7 +27,7 @@ from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
 REFRESH_S: Final = 0.2
 PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
 MOST_IN_FULL: Final = 4
-"""Largest number of diagnostic verdicts that are shown in full. If there are more, each verdict is
+"""Largest number of texts about diagnostics that are shown in full. If there are more, each text is
 cut to one line."""
 GREEN, YELLOW, RED, GREY, CYAN = "#98e024", "#f4bf4f", "#ff5f57", "#a0a0a0", "#58d1eb"
 COLOURS: Final = {

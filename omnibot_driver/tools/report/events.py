@@ -66,7 +66,7 @@ def _states(log: Log) -> Iterator[Finding]:
 def _lost(states: list[Span]) -> list[Span]:
     """Return the spans in which the board was out of reach: disconnected or connecting.
 
-    Adjoining spans are joined.
+    Spans that end in the first 3 s (``FIRST_SECONDS``) are left out. Adjoining spans are joined.
     """
     lost: list[Span] = []
     for state in states:
@@ -141,9 +141,10 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 
 
 def _told_elsewhere(status: Status) -> bool:
-    """Return whether another finding already reports this status.
+    """Return whether the report of the diagnostics omits this status.
 
-    Examples are a latched e-stop and a paused board.
+    It omits a status that another finding reports, such as a latched e-stop or a paused board. It
+    also omits the board's status in the first 3 s (``FIRST_SECONDS``).
     """
     if status.name.endswith("Commands"):
         return "e-stop" in status.message

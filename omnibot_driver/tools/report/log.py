@@ -15,8 +15,8 @@ Mask = NDArray[np.bool_]
 COMMAND_TIMEOUT_S: Final = 0.5
 """Time in s after which a command has no effect: the driver's default of ``cmd_vel_timeout``."""
 OTHER_CLOCK_S: Final = 1.0
-"""Time in s from the timestamps to the arrival of a topic's messages (median), above which the
-recorder's clock must differ from the driver's."""
+"""If timestamp and arrival of a topic's messages differ by more than this time in s (median), the
+recorder's clock differs from the driver's clock."""
 SETTLING_S: Final = 0.2
 """For this time in s before and after a change of state, a gap between messages is normal."""
 
@@ -46,10 +46,10 @@ class Series:
 
     @property
     def other_clock_s(self) -> float:
-        """How far the recorder's clock is ahead of that of the timestamps, in s.
+        """How far the recorder's clock is ahead of the timestamps' clock, in s.
 
-        0 if the difference is at most 1 s (``OTHER_CLOCK_S``), because it may be the delay of the
-        messages.
+        The value is the median difference of arrival and timestamp. It is 0 if this difference is
+        at most 1 s (``OTHER_CLOCK_S``), because the messages may only be delayed.
         """
         late_s = (self.arrived_s - self.stamp_s)[np.isfinite(self.stamp_s)]
         ahead_s = float(np.median(late_s)) if len(late_s) else 0.0
@@ -138,8 +138,9 @@ class Log:
     def two_wheels(self) -> bool:
         """Whether the robot has two driving wheels; False without joint_states.
 
-        This tells the two robots with an IMU apart. The Fejemis has two driving wheels, and its IMU
-        is mounted upright. The OmniBot has three, and its IMU hangs upside down.
+        The report needs this to distinguish the two robots that have an IMU. The Fejemis has two
+        driving wheels, and its IMU is mounted upright. The OmniBot has three driving wheels, and
+        its IMU hangs upside down.
         """
         return len(self.wheels) == 2
 

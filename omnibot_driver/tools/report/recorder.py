@@ -155,7 +155,10 @@ class Recorder:
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """Return a log of all messages, in the order of arrival; there must be at least one."""
+        """Return a log of all messages, in the order of arrival.
+
+        There must be at least one message.
+        """
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),
