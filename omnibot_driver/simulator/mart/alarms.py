@@ -187,9 +187,9 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels.
 
-    ``right``, ``left``: changes in units of the motor registers; forward is positive. Full speed is
-    128 units. If one wheel would be faster, it gets full speed, and the other wheel becomes slower
-    by the excess.
+    ``right``, ``left``: changes in units of the motor registers; forward is positive. If a wheel
+    would exceed the full speed, it gets the full speed, and the other wheel becomes slower by the
+    excess. Full speed is 128 units forward, and 127 units backward.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

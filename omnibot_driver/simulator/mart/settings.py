@@ -32,7 +32,7 @@ class Quirks:
     speed_word_first: a speed word after the number is ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB drive without a limit if the request has 0 or a
         word instead of a distance.
-    echoes_distance: TF and TB report the distance computed from time, not the driven one.
+    echoes_distance: TF and TB report the distance computed from time, not the driven distance.
     crashes_on_missing_numbers: TIME, CS, MCS, SFR, SRR and SDR end the server if a number is
         missing.
     crashes_early: VOLTS and all motions except F and B end a server that has just started.
