@@ -74,8 +74,8 @@ class Adjusting(Moves):
     def _predict_turn(self) -> None:
         """Pass the expected ratio of wheel speeds (left / right) to the odometry.
 
-        In turns on the spot, the odometry computes the turn from this ratio. In backward drives
-        (B), it does so while the server does not report the heading. Otherwise the ratio is None.
+        The odometry computes the turn from this ratio in turns on the spot, and in backward drives
+        (B) while the server does not report the heading. In all other motions, the ratio is None.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:

@@ -46,7 +46,7 @@ class Asking(Stops):
         self._ask_s = now
 
     def _stop_at_once(self, now: float) -> None:
-        """Let the driver use the stop port now, if it waits for a lost server or asks it."""
+        """Make the next stop command due at once, in the states LOST and ASKING."""
         if self.state is State.LOST:
             self._said_lost_s = -math.inf
         elif self.state is State.ASKING:
@@ -87,7 +87,8 @@ class Asking(Stops):
         elif abs(count - before[0]) > STRAY_COUNTS:
             self._sweep(now)
         else:
-            # the left wheel, which has no encoder, may turn; the stops of a lost server end that
+            # the left wheel, which has no encoder, may turn; the stops that the driver sends to a
+            # lost server end this motion
             self._lose(now, "the right wheel is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:

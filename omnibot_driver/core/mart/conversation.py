@@ -133,8 +133,8 @@ class Conversation:
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now. It must wait while a request is pending.
 
-        A query that is not urgent (PRESSING) also waits until no late reply can be mistaken for
-        its reply.
+        A query that is not in PRESSING, the urgent queries, also waits until no late reply can be
+        mistaken for its reply.
         """
         if self.pending is not None:
             return False
@@ -169,7 +169,7 @@ class Conversation:
         return max(map(self.late_until_s, word.forms)) - word.least_s
 
     def late_until_s(self, form: Form) -> float:
-        """Return the time until which a late reply or a copy of this form may come."""
+        """Return the time until which a late or duplicate reply of this form may come."""
         owed_s = self._owed_until_s.get(form, -math.inf)
         return max(owed_s, self._copies_until_s.get(form, -math.inf))
 
@@ -271,10 +271,10 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether a reply to the query ``word`` is a duplicate of another command's reply.
+        """Return whether ``reply`` is a copy of another reply, and so does not answer ``word``.
 
-        This is assumed if an equal reply to another query or to a move has just come, and if the
-        last reply to ``word`` was different.
+        This is assumed if ``word`` is a query, if an equal reply to another query or to a move has
+        just come, and if the last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

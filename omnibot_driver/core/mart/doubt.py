@@ -45,10 +45,11 @@ turns, it is multiplied by the angle in rad.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Random error of a turn that is computed from the commands, not measured.
+"""Random error of a turn that is computed from the commands, as a fraction of its constant error.
 
-It is a fraction of the constant error of this turn. Both errors are standard deviations. The random
-error is independent in each interval between two encoder counts.
+Both errors are standard deviations. An error of the assumed wheel speed ratio causes the constant
+error: it has the same sign in all intervals between two encoder counts. The random error is
+independent in each interval.
 """
 ASTRAY: Final = 0.7
 """How much an uncertain heading increases the error of a driven distance.

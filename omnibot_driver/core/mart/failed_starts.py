@@ -49,7 +49,7 @@ class FailedStarts(Adjusting):
             if reply.reason in ("", words.NO_START):
                 self.health.reference_failed(now)
             if not reply.reason and self.health.reference_fails == 1:
-                self._again_s = now  # after a stop that took long, an intact server fails once
+                self._again_s = now  # after a long stop, RM fails once, also on an intact server
             why = "the driver tries again"
             if self.health.reference_fails >= REFERENCE_FAILS:
                 self._blocked, self.health.reference_fails = Motion.REFERENCE, 0

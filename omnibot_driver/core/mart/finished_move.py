@@ -125,7 +125,7 @@ class Done:
 
     @property
     def has_run_twice(self) -> bool:
-        """Whether a complete run came before a second one, which the driver has stopped."""
+        """Whether a first run was complete, and the driver has then stopped a second run."""
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
 

@@ -45,9 +45,9 @@ It is a fraction of the initial allowed error. Without the increase, the robot c
 forth, because turns overshoot.
 """
 MOST_MOVES: Final = 9
-"""Largest number of moves to one goal, from the last long straight move on (``Move.cut``).
+"""Largest number of moves to one goal. If more are needed, the driver gives the goal up.
 
-After them, the driver gives the goal up.
+The count begins anew if the driver stops a straight move that takes too long (``Move.cut``).
 """
 
 
@@ -116,7 +116,7 @@ def docking_inches(longest_m: float) -> int:
 class Move:
     """The progress towards the goal ``place``.
 
-    ``said``: number of moves sent so far, from the last long straight move on (``cut``).
+    ``said``: number of moves sent that count towards MOST_MOVES; ``cut`` sets it to 0.
 
     ``turns``: number of turns since the last straight move.
 

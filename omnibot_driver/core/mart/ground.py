@@ -40,7 +40,7 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Time in s from a server's first reply after an absence until the driver starts a motion.
+"""Least time in s from a server's first reply after an absence to the start of a motion.
 
 While a server starts up, VOLTS and most motion commands crash it. If the command is RM (forward
 drive), the motors stay on after the crash.
@@ -180,7 +180,7 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that is in progress or may run again; None without one.
+        """Start time of a controlled move that is in progress or may run again; otherwise None.
 
         During a controlled move, the server reports no measurements.
         """

@@ -126,7 +126,7 @@ class Health:
     def _is_of_another(self, word: Word, inches: float) -> bool:
         """Return whether the distance is probably the reply to another query.
 
-        That is assumed for 0 inches, and for a distance that equals the other sonar's last one.
+        This is assumed for 0 inches, and for a distance that equals the other sonar's last reading.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
@@ -156,7 +156,10 @@ class Health:
         self.outlived = self._may_be_restarted = False
 
     def was_silent(self) -> None:
-        """Record that the server may have been restarted; its next heading at rest decides it."""
+        """Record that the server may have been restarted.
+
+        The next heading of the robot at rest shows whether it was (``rests``).
+        """
         self._may_be_restarted = True
 
     def rests(self, heading_rad: float) -> None:

@@ -19,10 +19,10 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Limit for a relative change of the motors' units to which the server has not replied.
+"""Largest relative change of the motors' units that may remain unanswered in a backward drive (B).
 
-It applies while no turn is measured: after a larger change, the robot may turn unnoticed, so the
-driver stops it.
+The limit applies while the server does not report the heading. After a larger change without a
+reply, the turn of the robot is not known, so the driver stops the robot.
 """
 
 
@@ -91,7 +91,7 @@ class Hearing(Measuring):
         if now >= self._started_s + 2 * self._delay_s and not self._greeted_before:
             if not self._port_is_free:
                 self._port_free_s = now
-            self._port_is_free = True  # a copy of the move would be ahead of HELLO in the queue
+            self._port_is_free = True  # the server would execute a copy of the move before HELLO
         self._hurry(now)
         if self.state is State.ASKING:
             self._named_s = now
@@ -99,7 +99,7 @@ class Hearing(Measuring):
             self._ask_what_moves(now)
             self._named_s = self._name_from_s
         if self.state is State.ASKING:
-            self._ask_s = max(self._ask_s, now + self._delay_s)  # earlier replies may come later
+            self._ask_s = max(self._ask_s, now + self._delay_s)  # earlier replies may still come
 
     def _hurry(self, now: float) -> None:
         """Shorten the wait for a reply, because the server has already answered a later HELLO.

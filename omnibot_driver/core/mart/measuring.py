@@ -90,7 +90,7 @@ class Measuring(Starts):
     def _counted(self, count: int, when: Moment, now: float) -> None:
         spun = self.state is State.STILL and self.odometry.motion is Motion.SPIN
         if spun and when.doubtful and now < self._rested_s + self._delay_s:
-            return  # maybe it is the angle in the reply to the stop
+            return  # the number may be the angle in the reply to the stop
         wheel = self.odometry.wheel
         before = None if wheel.may_begin_anew else wheel.last
         reading = self.odometry.counted(count, when)

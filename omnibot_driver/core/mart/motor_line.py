@@ -59,8 +59,10 @@ class MotorLine:
         self._ss -= to_slope * to_slope / variance
         self._so -= to_slope * to_offset / variance
         self._oo -= to_offset * to_offset / variance
-        if offset > 0.0 and error > 0.0:  # else the line would fall, although the motor is faster
-            slope -= self._so / self._oo * offset  # to the slope that belongs to the offset 0
+        if offset > 0.0 and error > 0.0:
+            # the offset is limited to 0: take the slope that fits this offset, because otherwise
+            # the line would fall although the motor is faster than expected
+            slope -= self._so / self._oo * offset
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver has learned about the two motors: how fast each turns at how many motor units.
+"""What the driver has learned about the two motors: how their speeds depend on the motor units.
 
 A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. Its speeds are in nominal
 units: at 10 motor units, an ideal motor has the speed 10. This module knows units,
@@ -133,5 +133,5 @@ def _learn_spin(lines: Lines, units: int, speed: float) -> None:
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:
-    """Return how many units give an ideal motor one encoder count per second, with 1 V."""
+    """Return the units that an ideal motor needs at 1 V for one encoder count per second."""
     return abs(settings.metres_per_count) * settings.nominal_volts / settings.speed_per_unit

@@ -136,7 +136,9 @@ class Moves(Asking):
                 self._recorded = move
                 return
         asked_m = 0.0 if turns else float(move.data.split()[-1]) * INCH_M
-        if not (self._rolled and abs(self.odometry.moved_m) < asked_m):  # else maybe an obstacle
+        # nothing is learned from a slow stop before the requested distance: an obstacle may have
+        # ended the move
+        if not (self._rolled and abs(self.odometry.moved_m) < asked_m):
             self._surplus.learn(move, self.odometry.moved_m, self.odometry.turn.spun_rad)
 
     def _use_turn_record(self) -> None:
@@ -206,9 +208,9 @@ class Moves(Asking):
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
         """Return whether the stops after a controlled move may have stopped a second run of it.
 
-        The result is False if the driver has sent no stop after the move. It is also False after a
-        complete move if there was certainly no second run. This is certain if the server answered
-        the stop sooner than it can end a motion, and too soon for a second run to end by itself.
+        The result is False if the driver has sent no stop after the move. It is also False if the
+        move was complete and the server answered again very soon: sooner than a stop can end a
+        second run, and sooner than a second run can end by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

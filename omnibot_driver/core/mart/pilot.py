@@ -47,10 +47,10 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
-"""Time in s since the last voltage query (VOLTS) after which the driver no longer delays VOLTS.
+"""Limit of the delay of a voltage query (VOLTS): time in s since the previous VOLTS.
 
 VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
-the driver delays VOLTS after such a request, but not beyond this time.
+the driver delays VOLTS after such a request, but not beyond this limit.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -119,14 +119,17 @@ class Pilot(Hearing):
 
     @property
     def ready(self) -> bool:
-        """Whether the server has answered the first stop, and is neither a wrong one nor lost."""
+        """Whether the server has answered the first stop.
+
+        The result is also False if the server is lost, or if it is not a MART controller.
+        """
         return self.greeted and not self.health.stranger and self.state is not State.LOST
 
     def fell_silent(self) -> None:
         """Begin a new connection after a long silence, because the server may have been restarted.
 
         Nothing changes during a motion or a job. Nothing changes either if the server's stop port
-        may be hung: if only the network failed, the port is still hung after the silence.
+        may be hung, because the end of a network failure does not free this port.
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()

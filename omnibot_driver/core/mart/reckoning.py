@@ -100,7 +100,7 @@ class Reckoning(CorrectedPose):
     def begin(self, motion: Motion, now: float) -> None:
         """Record that a motion was started; its encoder count begins at zero."""
         if motion is not Motion.REFERENCE and self.heading.from_s < self._stood_s:
-            self.heading.forget()  # on some servers the last motion has changed it
+            self.heading.forget()  # on some servers, the last motion has changed the heading
         self.motion, self.stands = motion, False
         self._began_s, self._stood_s = now, math.inf
         self.slowing_since_s = None
@@ -139,7 +139,8 @@ class Reckoning(CorrectedPose):
         """End the motion, after the distance that the robot coasted was measured too.
 
         After a turn on the spot, the server may have reported an implausible angle. In this case,
-        return the wheel's angle minus the server's angle, in rad. Otherwise return 0.
+        return the angle that the wheel measured minus the server's angle, in rad. Otherwise
+        return 0.
 
         ``longest``: longest possible distance of a straight move in m, or turn in rad.
         """
@@ -191,7 +192,7 @@ class Reckoning(CorrectedPose):
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add the heading error of a change of the wheel speed ratio at an uncertain time.
+        """Add a heading error: the wheel speed ratio changes at a time that is not exactly known.
 
         ``part``: relative change of the ratio. ``late_s``: length in s of the interval in which
         the change may happen.
@@ -319,5 +320,5 @@ class Reckoning(CorrectedPose):
 
 
 def _turn_error_rad(seconds: float) -> float:
-    """Return the standard deviation of a turn that is predicted for this time from a known rate."""
+    """Return the standard deviation of the turn in this time, predicted from a known turn rate."""
     return min(math.pi, ACCELERATION_RADPS2 * seconds * seconds / 2)

@@ -113,10 +113,11 @@ class RelativeHeading:
         before_rad, before_s, at_s = self._angle_rad, self.told_s, when.at_s
         if before_rad is None:
             old = abs(angle_rad - self._before_rad) < OLD_RAD < abs(self._before_rad)
-            if not old or when.from_s >= stood_s:  # else it is from before RM, which may be lost
+            # a heading like the one before RM is accepted only after the stop: RM may be lost
+            if not old or when.from_s >= stood_s:
                 self._take(angle_rad, when)
                 self.from_s = when.from_s
-                self.changed_s = max(self.changed_s, at_s)  # one heading shows no standstill
+                self.changed_s = max(self.changed_s, at_s)  # no change can be seen before this time
             return False
         if at_s <= before_s:
             return False

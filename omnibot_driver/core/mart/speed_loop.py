@@ -46,7 +46,7 @@ LEARN_TRIPS, LESS_PER_S = 4, 10.0
 SLOWEST_MPS: Final = 0.015
 """A wheel whose measured speed in m/s is above this is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
-"""Slowest wheel speed in m/s with which RM (forward) starts, so that the server sees it turn."""
+"""Least wheel speed in m/s at the start of RM (forward): the server must notice the motion."""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the units of the next RM (forward) grow after a start that turned no motor.
@@ -87,7 +87,7 @@ class _Side:
     window_m: float = 0.0
 
     def wanted_units(self, speed: float) -> int:
-        """Return the units that give ``speed`` (in nominal units); zero if it is not positive."""
+        """Return the units for ``speed`` (in nominal units); zero if ``speed`` is not positive."""
         return round(min(MOST_UNITS, max(0.0, self.line.units(speed)))) if speed > 0.0 else 0
 
 
@@ -124,7 +124,8 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors, at most 60.
 
-        The slower wheel needs these units. The result is more if an earlier start turned no motor.
+        These are the units for the speed of the slower wheel. The result is larger if an earlier
+        start turned no motor.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -156,12 +157,12 @@ class SpeedLoop(Motors):
 
     @property
     def blocked_s(self) -> float:
-        """Longest time in s for which a wheel has stood although it has enough units to turn."""
+        """Longest time in s for which a wheel has not turned although its units suffice."""
         return max(self._right.stood_s, self._left.stood_s)
 
     @property
     def left_over_right(self) -> float:
-        """Expected ratio of left to right wheel speed, by the units and the learned lines.
+        """Expected ratio of left to right wheel speed, from the units and the learned lines.
 
         If both sides have equal units, the ratio is ``balance``.
         """
@@ -264,7 +265,7 @@ class SpeedLoop(Motors):
         should_turn = units < MOST_DEAD and side.line.speed(units) > slowest
         must_turn = units >= MOST_DEAD and side.line.speed(units) > 2 * slowest
         side.stood_s = side.stood_s + self._window_s if must_turn and speed < slowest else 0.0
-        if speed > slowest or should_turn:  # else it stands, as it should
+        if speed > slowest or should_turn:  # else nothing is learned from a wheel at rest
             side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:

@@ -22,10 +22,11 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: for the first turn, until it has had a steady rate for EARLY_S (s).
+``OFF``: until the driver has learned from a turn, and only in the first EARLY_S (s) of a steady
+rate.
 
-``OFF_AGAIN``: afterwards. It is larger, because a new start disturbs the robot's motion more than
-a small error of the rate.
+``OFF_AGAIN``: in all other cases. It is larger, because a new start disturbs the robot's motion
+more than a small error of the rate.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for turns that something slows down, as fractions of the commanded rate.
@@ -58,7 +59,8 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 
 ``SEEN_RAD``: least angle of the turn, in rad.
 
-``TOLD_RAD``: above this angle in rad, the server's angle is used instead of the wheel's.
+``TOLD_RAD``: above this angle in rad, the angle from the server is used instead of the angle that
+the wheel measured.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
@@ -217,7 +219,7 @@ class SpotTurns:
             return False
         expected_rad = self._odometry.turn.spun_rad + self._rate_radps * unseen_s
         if abs(reply.number) <= 1 and abs(expected_rad) > UNSURE_RAD:
-            return True  # MCSTAT, or a sonar
+            return True  # maybe the reply to MCSTAT or to a sonar query
         told_rad = math.radians(reply.number) * self.settings.heading_sign
         most_rad = UNSURE_RAD + UNSURE_PART * abs(expected_rad) + abs(self._rate_radps) * 2 * trip_s
         return abs(told_rad - expected_rad) > most_rad
@@ -252,12 +254,12 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from a slow turn, if the next turn shows that something held it.
+        """Forget what was learned from a slow turn, if the next turn shows that the robot was held.
 
         ``part``: the next turn's measured rate divided by its commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
-            # from both turns, a dead zone would be learned that the motors do not have
+            # otherwise the driver would learn from both turns a dead zone that does not exist
             self._loop.restore(self._before_slow)
             self._before_slow = None
         else:

@@ -209,7 +209,8 @@ class Starts(FailedStarts):
         self._switch_off.begins(straight=self.motion is Motion.STRAIGHT)
         if start.word.kind is Kind.MOVE:
             self._last_move = start
-            # a docking move ends at the dock, and a rescue turn begins with the robot in motion
+            # the driver must not learn from the length of a docking move, which ends at the dock,
+            # or of a turn that begins with the robot in motion
             self._moved_by = None if self.jobs.moving or self._rescue else start
             self._greet_s, self._free_s = now + GREET_S, math.inf
             self.state = State.MOVING

@@ -103,7 +103,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.ASKING: frozenset({HELLO, ENC, RESET, MSM, SL, SS}),
     State.LOST: frozenset({HELLO, SRM, SM, SL, SS}),
 }
-"""The commands that are allowed in each state.
+"""The commands that are allowed in each state. HELLO is sent without a check of this table.
 
 The commands in NEEDS_IMU also require that a check (RESET or CHECK) has just shown that the IMU
 works.

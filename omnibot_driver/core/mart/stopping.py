@@ -49,10 +49,10 @@ The server waits 0.6 s for a wheel to turn. After the turn, it waits 0.75 s for 
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
-    """Return whether a motion failed only because the wheels turned for long after its end.
+    """Return whether a motion failed only because the wheels turned too long after its end.
 
-    The motors are then off. For a controlled turn, the text of the failure is the same as if the
-    turn had not begun, so the duration decides.
+    The motors are then off. For a controlled turn, the server may send the failure text of a turn
+    that has not begun, so the duration decides.
 
     ``lasted_s``: time from the start to the reply, without the transit times.
     """
@@ -148,7 +148,7 @@ class Stopping:
             return False
         self._silent_from_s = now + self._patience_s
         none = isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION)
-        if now >= self._own_from_s:  # it answers the start or a stop: all other replies have come
+        if now >= self._own_from_s:  # from this time on, a reply answers the start or a stop
             if not none and not _is_number(reply):
                 self.began = True
             elif none and self._rounds == 1:
@@ -197,7 +197,7 @@ class Stopping:
         if not isinstance(reply, Ok | Fail):
             return False
         if isinstance(reply, Ok) and now < self._own_from_s:
-            return False  # it may answer a copy of an earlier request; the server's name decides
+            return False  # maybe the reply to a copy of another request; HELLO decides
         self.result = reply
         self.began = isinstance(reply, Ok) or None
         return True

@@ -59,8 +59,8 @@ STUCK_S, COASTS_S = 0.5, 0.2
 
 ``STUCK_S``: before a stuck right wheel is noticed, if the server does not report the heading.
 
-``COASTS_S``: after a stop, if the right wheel stands already. The server then ends the measurement
-of the motion, although the left wheel still coasts.
+``COASTS_S``: after a stop, if the right wheel is already at rest. The server then ends the
+measurement of the motion, although the left wheel still coasts.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -162,7 +162,7 @@ class Stops(Ground, ABC):
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())
         owed = int(pending is not None and any(form in answers for form in pending.word.forms))
-        # a copy of the check's reply may have been taken for the start's
+        # a copy of the reply to the check may have been mistaken for the reply to the start
         owed += now < self._start_owed_until_s and self.conversation.doubles(now)
         self.conversation.give_up(now)
         move = self._start if self.motion in (Motion.STRAIGHT, Motion.TURN) else None
@@ -282,18 +282,18 @@ class Stops(Ground, ABC):
         )
 
     def _outlives(self, reply: Reply, now: float) -> None:
-        """Record that the server answers a stop only after the driver has used the stop port.
+        """Evaluate a reply that came after the driver has used the stop port.
 
-        In this state, the server's stop port could hang the next forward drive (RM); see
-        docs/boards/mart.md. A reply with a number does not show this state. It answers an earlier
-        query, or the stop of a turn on the spot, which leaves the stop port free.
+        If the server has only now answered a stop, its stop port could hang the next forward drive
+        (RM); see docs/boards/mart.md. A reply with a number does not show this. It answers an
+        earlier query, or the stop of a turn on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return
         network = self.conversation
         asked = network.pending is not None or now < network.late_until_s(Form.NOTHING)
         if self.state is State.ASKING and asked:
-            return  # it may answer RST IMU or MSM
+            return  # maybe the reply to RST IMU or MSM
         if reply.form is Form.NOTHING and reply.form in ANSWERS.get(self.motion, ()):
             self.health.outlives()
 

@@ -9,9 +9,9 @@ not know the pose.
 from typing import Final
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest accepted difference of a reported turn from the wheel's turn.
+"""Largest accepted difference between a reported turn and the turn that the wheel measured.
 
-It is TOLD_RAD (rad), plus TOLD_PART times the wheel's turn.
+It is TOLD_RAD (rad), plus TOLD_PART times the measured turn.
 """
 NO_CORRECTION: Final = 0.0
 
@@ -21,7 +21,8 @@ class TurnAngle:
 
     Some methods return a correction, which the caller adds to the pose's heading, in rad.
 
-    ``spun_rad``: the wheel's turn; after ``record`` the recorded turn.
+    ``spun_rad``: the turn of the robot, as the wheel measured it; after ``record``, the recorded
+    turn.
     """
 
     def __init__(self) -> None:
@@ -53,7 +54,7 @@ class TurnAngle:
     def end(self, *, may_be_recorded: bool) -> float:
         """End the turn after its last count; return the correction of the heading.
 
-        The wheel's turn replaces an implausible angle that the server has reported.
+        The turn that the wheel measured replaces an implausible angle that the server has reported.
 
         ``may_be_recorded``: whether the server may have recorded the turn.
         """
@@ -81,8 +82,9 @@ class TurnAngle:
 
 
 def is_of_another(wrong_rad: float, spun_rad: float) -> bool:
-    """Return whether a reported angle is too far from the wheel's turn to be of the same motion.
+    """Return whether a reported angle is too far from the measured turn to be of the same motion.
 
-    ``spun_rad``: the wheel's turn. ``wrong_rad``: difference between it and the reported angle.
+    ``spun_rad``: the turn that the wheel measured. ``wrong_rad``: difference between this turn and
+    the reported angle.
     """
     return abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(spun_rad)

@@ -50,8 +50,8 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last count, if it differs by at most 1 from the count before the start command,
-    so that this command may be lost; 0 in all other cases.
+    ``maybe``: the last count, if it differs by at most 1 from the count before the start command.
+    The start command may then be lost. 0 in all other cases.
     """
 
     def __init__(self) -> None:
@@ -163,9 +163,10 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether an uncertain count goes back within this motion.
+        """Return whether an uncertain count is clearly nearer to zero than this motion's last one.
 
-        Such a count is a wrong reply.
+        The result is also True if the two counts have different signs. Such a count is a wrong
+        reply.
         """
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:

@@ -43,7 +43,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """One command of the server. Two are equal if their texts are.
+    """One command of the server. Two commands are equal if their texts are equal.
 
     ``forms``: the forms of a successful reply.
 
