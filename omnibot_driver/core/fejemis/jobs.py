@@ -212,8 +212,8 @@ class Jobs:
             elif job is Job.POWER_OFF and late and role == "drive":
                 self._finish(
                     True,
-                    "power-off command sent: the board should cut the power"
-                    f" {self._text[4:].decode('ascii')} s after this call; it does not confirm it",
+                    "power-off command sent; the board does not confirm it, but should cut the"
+                    f" power {self._text[4:].decode('ascii')} s after this call",
                 )
         elif job is Job.LOAD and now - self._begun_at > SAID * AGAIN_S:
             if _answers(role, message):
