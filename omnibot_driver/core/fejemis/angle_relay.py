@@ -22,8 +22,8 @@ MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit in degrees. Damage that the checksum does not detect can turn the text of an angle to the
-right into an angle to the left. The driver avoids a text if this wrong angle could reach the limit.
+"""Limit in degrees. Undetected damage can remove the minus sign, so that an angle to the right
+becomes a wrong angle to the left. The driver avoids a text whose wrong angle can reach the limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -60,8 +60,8 @@ def heard_instead(text: str) -> Iterator[float]:
 def _with_sum(tenths: int) -> bytes:
     # A checksum does not detect the loss of two characters whose codes add up to 99. So the angle
     # is rounded, by at most half a degree, to digits without such a pair. Some angles to the right
-    # need ``-`` and ``6``, such a pair. If both are lost, the board reads less than 10° to the
-    # left.
+    # cannot be written without the pair ``-`` and ``6``. For these, a text is used from which the
+    # board reads less than 10° to the left if both characters are lost.
     across = ""
     for off in range(ROUNDED + 1):
         for near in (tenths + off, tenths - off)[: 2 if off else 1]:

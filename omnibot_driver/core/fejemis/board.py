@@ -116,7 +116,7 @@ class FejemisBoard(Board):
 
     @property
     def start_refusal(self) -> str:
-        """The reason why the drive board cannot be started now: the e-stop; otherwise empty."""
+        """Why the drive board cannot be started (a latched e-stop); empty if it can be started."""
         if self._obedience.estopped:
             return "the e-stop is latched; release it with ~/estop (data: false), then call again"
         return ""
@@ -307,9 +307,9 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two alternatives for the watchdog process: Stop, or an emergency stop and Stop.
+        """Return the guard's packets: Stop; with a latched e-stop, emergency stop and then Stop.
 
-        Both also switch brush and lift off.
+        In both cases, the packets also switch brush and lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 
@@ -324,7 +324,7 @@ class FejemisBoard(Board):
         return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
-        """Return the packets due now: the front wheel's angle, ``start``, those of ``Upkeep``."""
+        """Return the packets to send now: front wheel's angle, ``start``, packets of ``Upkeep``."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
             text = self._relay.text(angle_rad, sums=self.with_sums)

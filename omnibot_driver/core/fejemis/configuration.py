@@ -37,12 +37,13 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Largest accepted relative difference between a written number and the number that the board
-reports, or ``DIGIT`` if that is larger. Boards print few digits."""
 DIGIT: Final = 6e-4
+"""``NEAR`` (relative), ``DIGIT`` (absolute): limits for the difference between a written number and
+the number that the board reports. The larger limit applies, because boards print few digits."""
 HALF: Final = 0.51
-"""The same in units of the last digit that the board prints, if this is smaller: half a unit, and a
-little more, because the board's numbers have single precision."""
+"""A third limit for this difference, in units of the last digit that the board prints. It applies
+instead if it is smaller. It is a little more than half a unit, because the board's numbers have
+single precision."""
 
 
 class Configuration:
@@ -58,7 +59,7 @@ class Configuration:
         """Numbers that the board reported last, by the keyword of the line. They may still need
         confirmation by a second, equal report."""
         self._digits: dict[str, tuple[float, ...]] = {}
-        """Units of the numbers' last digits in the last line, by its keyword."""
+        """By keyword: the unit of the last digit of each number in the last line."""
         self.turned = False
         """Whether the board's ``confs`` line (steering geometry) begins with the track.
 
@@ -158,8 +159,9 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them.
 
-        The user's values are returned if the board has not reported its values, or if the two are
-        equal except for rounding. None if neither the user nor the board has given values.
+        The user's values are returned if the board has not reported its values, or if its values
+        equal the user's, except for rounding. None if neither the user nor the board has given
+        values.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

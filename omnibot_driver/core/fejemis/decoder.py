@@ -18,7 +18,7 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""How many heartbeats in a row prove that the board began or ceased to send checksums."""
+"""How many heartbeats in a row prove that the board now sends, or no longer sends, checksums."""
 
 
 @dataclass(slots=True)

@@ -108,7 +108,7 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the body twist of ``packets``, for the front wheel's angle used by ``encode``.
+        """Return the twist that ``packets`` give the body at the wheel angle that ``encode`` used.
 
         The caller passes packets that were sent. If they are not the last result of ``encode``, or
         are passed a second time, they are regarded as a stop.

@@ -2,7 +2,8 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A line in another form is regarded as damaged, unless three in a row have the same new form.
+A line in another form is regarded as damaged. If three such lines in a row have the same form, the
+third is accepted, and its form is the learnt form from then on.
 
 The module knows forms; it does not know the meaning of a line.
 """
@@ -29,7 +30,7 @@ class Forms:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Return whether the line has the form learnt for its kind. Then learn from the line.
+        """Learn the form of a line, and return whether this form is accepted.
 
         ``summed``: whether the line has a correct checksum.
         """

@@ -105,8 +105,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always accepted. An angle after a jump that is too large for the wheel is
-        rejected, unless it confirms the angle that was rejected just before it.
+        The first angle is always accepted. Later, an angle is rejected if it is too far from the
+        last accepted angle. If the next angle is near the rejected angle, it is accepted.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

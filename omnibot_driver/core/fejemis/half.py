@@ -54,7 +54,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """State of one half, as the driver calls each of the robot's two boards (drive or front).
+    """State of one half: the drive board or the front board.
 
     ``identity``: the identity in its heartbeats; None before the first heartbeat.
 
@@ -136,7 +136,7 @@ class Half:
         return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
 
     def not_understood(self, now: float) -> bool:
-        """Return whether more than ``MANY`` lines were damaged or unknown within the current 1 s.
+        """Return whether more than ``MANY`` lines were damaged or unknown in the current second.
 
         The caller calls this after each read.
         """
@@ -226,7 +226,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first identity at once; another one must be in two heartbeats in a row."""
+        """Accept the first identity at once; another identity must come twice in a row."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self._clock_of:

@@ -18,11 +18,11 @@ Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
 # The lines carry neither time nor number. Every ``PERIOD_S``, the board sends both lines of a
-# sample in one cycle, always in the same order. Three observations show a false pair: a line of
-# another kind between its lines that usually does not come there; a long time between its lines,
-# so that it waits for the next pose; the next pose, if lines are missing since the previous pose.
-# One kind of false pair remains undetected: both lines are late, but close together, and no later
-# pose is in the read.
+# sample in one cycle, always in the same order. A false pair is detected in two ways. A line of
+# another kind comes between its lines, and usually lines of this kind do not come there. Or the
+# time between its lines is long, so the pair waits for the next pose, and this pose shows that
+# lines are missing since the previous pose. One kind of false pair remains undetected: both lines
+# are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
 """If the second line of a pair arrives this time in s or more after the first line, the pair may be
 false. It must then wait for the next pose."""
@@ -33,14 +33,15 @@ The pose shows whether the board was silent, or the host only read late. If the 
 the sampling time of the pair is unknown, so the pair is rejected.
 """
 WARY_S: Final = 1.0
-"""Time in s after a stall of the driver in which every pair must wait for the next pose. In the
-stall, the kernel's buffer may have overflowed. Lines were then lost without a silence."""
+"""For this time in s after a stall of the driver, every pair must wait for the next pose. During
+the stall, the kernel's buffer may have overflowed. Lines were then lost without a silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits in s for a difference: the sum of the intervals before gyro lines, minus the sum of the
-intervals before acceleration lines. An interval begins at the previous line, of the other kind.
-If the difference is at least ``KNOWN_S`` in magnitude, its sign shows which line of a sample comes
-first, because the intervals between two samples are longer than those within a sample.
+"""Limits, in s, for a difference: the sum of the intervals before gyro lines, minus the sum of the
+intervals before acceleration lines. Each interval begins at the previous line of the other kind.
+
+The interval between two samples is longer than the interval within a sample. So the sign of the
+difference shows which line of a sample comes first, if the magnitude is at least ``KNOWN_S``.
 ``SUREST_S``: largest magnitude that is stored.
 """
 MARKED_S: Final = PERIOD_S
@@ -114,8 +115,8 @@ class ImuPairs:
         how many came within pairs."""
         self._skipped = 0
         self._silent = False
-        """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines
-        since the last pose or rejected pair. New pairs are then doubtful."""
+        """Whether two successive gyro or acceleration lines came more than ``SILENT_S`` apart. New
+        pairs are then doubtful. The next pose, or the rejection of a pair, resets this flag."""
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -138,7 +139,7 @@ class ImuPairs:
         """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
 
         If the first line of a pair has arrived, but not the second, the second is regarded as lost.
-        The exception is a ``kind`` that usually comes within pairs.
+        This does not apply if lines of this ``kind`` usually come within pairs.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:

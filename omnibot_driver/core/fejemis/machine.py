@@ -139,7 +139,7 @@ class Machine:
         texts: list[bytes] = []
         if self._off_left:
             self._off_left -= 1
-            commanded = self.volts, self.brush  # since it was switched off
+            commanded = self.volts, self.brush  # commands since the call of ``off``
             texts += [text for text, on in zip(OFF, commanded, strict=True) if not on]
         elif self.brush or self._brush_left:
             self._brush_left = max(0, self._brush_left - 1)

@@ -3,8 +3,8 @@
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
 A line has a speed and a turn rate. The front board uses only their ratio. The drive board uses only
-the root of the sum of their squares. So several lines give the same motion. The module selects a
-line in which such a loss is detected, as near to the command as possible.
+the root of the sum of their squares. So several lines give the same motion. Of the lines in
+which such a loss is detected, the module selects the one that is nearest to the command.
 """
 
 import math

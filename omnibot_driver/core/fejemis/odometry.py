@@ -15,8 +15,8 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""If rounding of the pose can explain the difference between a pose and the wheels' motion, one
-displacement corrects this fraction of the difference."""
+"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects,
+if rounding of the pose can explain the difference."""
 ROUNDINGS: Final = 1.5
 """Largest difference that rounding of the poses explains, in units of their last digit. Each of two
 poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
@@ -34,8 +34,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""If this number of rejected poses in a row agree with the rejected pose before them, the board
-has begun a new coordinate frame."""
+"""If this number of rejected poses in a row agree, each with the rejected pose just before it, the
+board has begun a new coordinate frame."""
 
 
 class PoseOdometry:
@@ -61,7 +61,7 @@ class PoseOdometry:
         """
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """How many rejected poses in a row agreed with the rejected pose before them."""
+        """How many rejected poses in a row agreed, each with the rejected pose just before it."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf

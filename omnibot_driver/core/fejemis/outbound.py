@@ -35,10 +35,10 @@ def robust(text: bytes) -> bool:
     One character of such a pair is a line end or a digit of the checksum. The other character is
     ``;`` or part of a number.
     """
-    # A lost line end joins two lines. The joined line is accepted if the character whose code is
-    # the sum of the second line with its prefix is lost too. So this sum must not be the code of
-    # ``;`` or of a character in numbers. After a lost digit of the checksum, one other lost
-    # character is undetected too. So this character must not occur in numbers.
+    # A lost line end joins two lines. Let S be the sum of the second line with its prefix ``;NN``.
+    # The board accepts the joined line if a character with the code S is lost too. So S must not be
+    # the code of ``;`` or of a character in numbers. If a digit of the checksum is lost, there is
+    # one character whose loss makes the damage undetected. It must not occur in numbers.
     total = sum_of(text)
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS

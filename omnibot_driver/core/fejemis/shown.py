@@ -12,8 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of lines that the diagnostics show: the latest lines from the driver that the
-firmware does not know."""
+"""Largest number of unknown lines that the diagnostics show. These are the latest lines from the
+driver that the firmware does not know."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

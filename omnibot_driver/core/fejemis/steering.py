@@ -17,7 +17,8 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Smallest target angle of the front wheel, in rad, with which a command is a turn on the spot."""
+"""Limit in rad. If a command's target angle of the front wheel reaches this limit, the command is a
+turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """``ALIGNED_RAD``: largest deviation of the front wheel from its target angle, in rad, at which a
@@ -26,9 +27,9 @@ turn on the spot may begin. Other motion has full speed up to the same deviation
 ``STILL_ALIGNED_RAD``: largest deviation at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad. At full speed, this deviation causes
-the largest accepted error of the body's velocity. At a larger deviation, the speed is limited so
-that the error does not exceed this value."""
+"""Deviation of the front wheel from its target angle, in rad. The error of the body's velocity that
+this deviation causes at full speed is the largest accepted error. At a larger deviation, the speed
+is limited so that the error does not become larger."""
 
 
 @value(frozen=True, slots=True)

@@ -2,8 +2,8 @@
 
 """The checksum ``;NN`` in front of a line. With it, a board detects most damaged lines.
 
-It does not detect 1 in 99 random changes. It also does not detect the loss of a ``c`` (code 99), or
-the loss of two characters whose codes add up to 99 or 198.
+The checksum does not detect 1 in 99 random changes. It also does not detect the loss of a ``c``
+(code 99), or the loss of two characters whose codes add up to 99 or 198.
 
 The module knows characters; it does not know the meaning of a line.
 """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keeps both boards sending and configured, and runs the user's requests other than motion.
+"""Makes both boards send data, configures them, and runs the user's requests other than motion.
 
 The module combines subscriptions, polls, configuration, jobs, brush, lift and lights.
 """

@@ -85,7 +85,7 @@ class Watch:
 
     @property
     def front_unheard_at(self) -> float:
-        """Time in s at which brush and lift must be off if no wheel angle arrives earlier."""
+        """Time in s at which brush and lift must be off if no front wheel angle arrives before."""
         front = self._ports.half("front")
         return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 

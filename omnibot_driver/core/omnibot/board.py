@@ -167,7 +167,7 @@ class OmniBot:
 
     @property
     def advice(self) -> str | None:
-        """A sentence on a setting that the board's data has contradicted; None until then."""
+        """Advice on a setting that the board's data contradicts; None if all seem right."""
         return self._translation.suspicion.advice
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
@@ -227,7 +227,7 @@ class OmniBot:
         """Do nothing: the board does not have a command that resets only its odometry."""
 
     def leave(self) -> None:
-        """Do nothing: the driver sends this board no polls or subscriptions that it must end."""
+        """Do nothing: this board has no polls or subscriptions that the driver must end."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Return the stream that encodes commands and repeats their frames."""
@@ -248,8 +248,8 @@ class OmniBot:
     def pause(self) -> Packets:
         """Return Stop and the letter P.
 
-        P would start a paused board, so this method raises RequestRefused unless the board is known
-        to run.
+        P would start a paused board. So this method raises RequestRefused if the board is paused or
+        its mode is unknown.
         """
         self._translation.apply(Happening.SENT_PAUSE)
         return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))

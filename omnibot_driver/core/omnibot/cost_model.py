@@ -89,7 +89,7 @@ If only one word differs, it is most likely damaged. A shock changes several wor
 more words is only a little higher.
 """
 AFTERSHOCK: Final = 1.5
-"""Cost of an IMU frame with unusual content after another one with unusual content.
+"""Cost of an IMU frame with unusual content that follows another such frame.
 
 The cost is low, because a shock lasts several frames.
 """

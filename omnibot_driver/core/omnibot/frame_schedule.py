@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The order in which a running board sends frames, and what it reveals about lost frames.
+"""The order in which a running board sends frames, and an estimate of the frames that were lost.
 
 At 25 Hz, the board sends a delta after every fourth IMU frame, and a pose after every fifth delta.
 So the number of discarded bytes shows which frames were lost. This is only an estimate; the

@@ -52,7 +52,7 @@ class InterFrameGaps:
     * ``between``: whether a frame normally begins somewhere in the read after a pause.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. Further
       confirmations are then not counted.
-    * ``at_pace``: whether the line was not idle before the last read's bytes.
+    * ``at_pace``: whether the last read's bytes came without idle time before them.
     * ``collected``: whether an adapter collected the last read's bytes for more than a tick.
     """
 
@@ -133,7 +133,7 @@ class InterFrameGaps:
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
         """Return whether only later bytes can show the cause of a pause in ``data[start:end]``.
 
-        False if another pause there was certainly an idle line.
+        False if an idle line certainly caused another pause there.
         """
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes

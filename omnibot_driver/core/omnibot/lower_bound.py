@@ -36,8 +36,8 @@ def least_costs(data: bytes) -> list[float]:
     ends = _undamaged(data)
     first = min((at for at, end in ends.items() if end == size), default=size)
     boundaries, runs = [0.0] * (size + 1), [0.0] * (size + 1)
-    # Where no frame begins, a damaged frame or a bad run does. A damaged frame covers at most REACH
-    # bytes and costs at least DAMAGE. A bad run costs more per byte.
+    # At a place where no undamaged frame begins, a damaged frame or a bad run begins. A damaged
+    # frame covers at most REACH bytes and costs at least DAMAGE. A bad run costs more per byte.
     filled, damages, reach = size, 0, size
     while reach > 0:
         damages += 1
@@ -59,7 +59,7 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return, for each possible start of a frame, where the undamaged frames from there end.
+    """Return, for each possible start of a frame, the end of the row of undamaged frames there.
 
     Keys and values are positions in ``data``. The keys are in descending order.
     """

@@ -37,8 +37,8 @@ more than ``CLEARLY_M``, and by more than ``TIMES`` times the error in the other
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""``FEWEST_DELTAS``, ``FOR_S``: a period of the deltas other than the configured one must be seen
-in at least this number of consecutive deltas, and for at least this time in s."""
+"""``FEWEST_DELTAS``, ``FOR_S``: the user is advised to set another period of the deltas only after
+this number of consecutive deltas with that period, and only after this time in s."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}

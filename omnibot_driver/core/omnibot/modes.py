@@ -63,7 +63,7 @@ class ModeTracker:
             raise RequestRefused(
                 f"the board is {self.mode.value}: «{happening.value}» is not allowed in this mode"
             ) from None
-        if happening is not Happening.SENT_START:  # the driver may repeat S before the last frame
+        if happening is not Happening.SENT_START:  # a repeated S must not restart the count
             self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:

@@ -16,8 +16,8 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""If the elapsed time differs from the time that a counter shows by more than this, in s, the board
-may have restarted.
+"""Limit, in s, for the difference between the elapsed time and the time that a counter shows. If
+the difference is larger, the board may have restarted.
 
 The drift of the clock is added to this limit. The limit is above the largest error of the arrival
 times: 0.24 s, if the host's buffer is full and every tenth byte is lost.
@@ -25,14 +25,15 @@ times: 0.24 s, if the host's buffer is full and every tenth byte is lost.
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and so of the time that a counter shows.
 
-After minutes of silence, the resulting error is too large to show a restart. Only the board's pose
-can then prove one.
+After minutes of silence, this error is so large that the counter cannot show a restart. Only the
+board's pose can then prove a restart.
 """
 EARLY_S: Final = 0.2
 """Largest time in s by which a counter may be ahead of the elapsed time after a restart.
 
-If the last delta before the restart was read late, the elapsed time is measured too short. The
-restart itself takes longer than ``EARLY_S``, and is part of the elapsed time.
+The elapsed time is measured from the arrival of the last delta before the restart. If this delta
+was read late, the elapsed time is too short. The elapsed time includes the restart itself, which
+takes longer than ``EARLY_S``.
 """
 LONG_GAP_S: Final = 1.0
 """Duration of lost deltas, in s, above which the next pose cannot show a restart: the last delta is
@@ -45,7 +46,7 @@ class Step:
 
     * ``lost``: number of missing deltas that were not reported before.
     * ``duration_s``: time that the delta covers; None if unknown.
-    * ``restarted``: the counter seems to restart; only the board's pose proves it.
+    * ``restarted``: whether the counter seems to have restarted; only the board's pose proves it.
     """
 
     lost: int
@@ -72,8 +73,8 @@ class Sequence:
         self._ahead: int | None = None
         """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        Such a counter may be damaged. Until the next delta continues it, the number of lost deltas
-        is computed from the elapsed time.
+        Such a counter may be damaged. Until the next delta continues this counter, the number of
+        lost deltas is computed from the elapsed time.
         """
         self._left: tuple[int, float, int] | None = None
         """The last counter before a supposed restart, its arrival time in s, and the first counter
@@ -159,7 +160,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if ``count`` continues the earlier count, not the new one."""
+        """Withdraw a supposed restart if ``count`` continues the old counter, not the new one."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

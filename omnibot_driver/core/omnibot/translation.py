@@ -44,10 +44,10 @@ FULL: Final = 4000
 """Smallest number of bytes, decoded after one read, at which the kernel's buffer of 4 KiB may have
 been full. The number is below 4096, because the decoder may keep some bytes of a read for later."""
 BEHIND_S: Final = 0.5
-"""If a read is late by more than this time, in s, the next read may be late too.
+"""If a read is late by more than this time, in s, the driver checks whether the next read is late.
 
-The next read is late if the board needed longer to send the bytes of the next read than ``BURST_S``
-plus twice the time between the two reads.
+The next read is late if sending its bytes took the board longer than ``BURST_S`` plus twice the
+time between the two reads.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2

@@ -36,7 +36,7 @@ STEP: Final = 5.5
 """First cost limit of the search, as a distance above the lower bound of the cost.
 
 Interpretations that cost more than the limit are not searched. The limit rises until the search
-finds one.
+finds an interpretation.
 """
 BEYOND: Final = 0.025
 """Small addition to the cost limit, so that rounding errors have no effect.
@@ -128,7 +128,7 @@ class _Search:
         self._expectation = expectation
         self._pauses = pauses
         self._pose_byte_order = pose_byte_order
-        # Node 2n: in a bad run before byte n; 2n + 1: at a boundary there; last node: the end.
+        # Before byte n: node 2n in a bad run, node 2n + 1 at a frame boundary. Last node: the end.
         self._end = 2 * len(data) + 2
         self._start_context = context
         self._least: list[float]
