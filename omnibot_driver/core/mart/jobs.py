@@ -222,7 +222,7 @@ class Jobs:
 
     def piece(self, data: bytes, now: float) -> None:
         """Keep a datagram as a piece of the file if it has the size of a piece."""
-        if len(data) in (PIECE, self._size % PIECE):
+        if data and len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
             complete = len(self._pieces) * PIECE >= self._size
             if self.job is Job.TURN_RECORD:

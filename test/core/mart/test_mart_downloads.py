@@ -10,6 +10,7 @@ from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import JobDone
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
+from omnibot_driver.simulator.mart.files import FileNote
 
 
 def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
@@ -91,6 +92,24 @@ def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
     done = bench.job(Job.LAST_MOVE)
     assert not done.success
     assert "order" in done.message
+
+
+def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of two whole pieces is downloaded whole, although an empty datagram comes between."""
+    content = bytes(range(256)) * 2 + bytes(reversed(range(256))) * 2
+    monkeypatch.setattr(FileNote, "content", content)
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    inner = bench.robot.advance
+    bench.robot.advance = lambda: [  # type: ignore[method-assign]
+        out
+        for packet in inner()
+        for out in (packet, *((packet[0], b"") for _ in packet[1:] if len(packet[1]) == 512))
+    ]
+    done = bench.job(Job.LAST_MOVE)
+    assert done.success, done
+    assert done.content == content
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
