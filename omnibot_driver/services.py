@@ -116,7 +116,7 @@ class Services:
                 calibration.save(file, {"gyro_bias": bias})
                 answer.set_result("")
             except Exception as error:  # the caller must get an answer
-                answer.set_result(str(error))
+                answer.set_result(str(error) or repr(error))
             if self._node.executor is not None:
                 self._node.executor.wake()
 

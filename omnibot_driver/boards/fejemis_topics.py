@@ -248,8 +248,8 @@ class FejemisTopics:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
         ``what``: name of the topic or device, which the reason contains. ``off``: whether the
-        action switches something off. Such an action is never refused, but the reason says if a
-        port is not open.
+        action switches something off. Such an action is carried out in any state of the boards,
+        but the reason says if a port is not open.
         """
 
         def say(session: Session, now: float) -> str:

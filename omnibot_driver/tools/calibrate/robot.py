@@ -150,17 +150,16 @@ class Robot(Listener):
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)
         client = self._node.create_client(Trigger, f"{self.driver}/{service}")
-        began_s, answer = time.monotonic(), None
         try:
             if not self._wait(client.service_is_ready, ANSWER_WITHIN_S):
                 raise ToolError(f"{self.driver} does not offer ~/{service}")
-            answer = client.call_async(Trigger.Request())
+            answer, asked_s = client.call_async(Trigger.Request()), time.monotonic()
             with self._unmonitored():
                 try:
                     while not answer.done():
                         self._spin(PERIOD_S)
                         self._require_sound()
-                        if time.monotonic() - began_s > ASKED_WITHIN_S:
+                        if time.monotonic() - asked_s > ASKED_WITHIN_S:
                             publisher.publish(Float32MultiArray(data=command))
                 finally:
                     for _ in range(round(STOPPING_S / PERIOD_S)):
