@@ -141,6 +141,13 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
     ]
 
 
+def test_a_gap_at_the_end_begins_at_a_timestamp_too(drive: Drive) -> None:
+    """The recorder's clock is 3 s behind the robot's. The report places gaps by timestamps."""
+    drive.imu.drop(17.0, 99.0)
+    drive.imu.late_s = drive.imu.late_s - 3.0
+    assert "from 17.0 s on" in said(drive, "Gaps", "imu/data_raw").text
+
+
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
     """Half of the IMU readings are missing: every other one. The report calls the rate wrong.
 
@@ -239,6 +246,9 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
     assert not troubles(drive)
+    assert said(drive, "Diagnostics", "No warning").text == (
+        "No warning and no error except for the start, pauses and the e-stop."
+    )
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, "cmd_vel refused: nan", {}))
     assert "cmd_vel refused: nan" in said(drive, "Diagnostics", "Commands").text
 

@@ -118,11 +118,8 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
             f"/diagnostics has data of several robots, on {ports}; this report lists the data of"
             " all of them.",
         )
-    troubles = [
-        status
-        for status in log.diagnostics
-        if status.level in (1, 2) and not _told_elsewhere(status)
-    ]
+    not_ok = [status for status in log.diagnostics if status.level in (1, 2)]
+    troubles = [status for status in not_ok if not _told_elsewhere(status)]
     for (port, name), group in groupby(sorted(troubles, key=_key), key=_key):
         statuses = list(group)
         worst = max(status.level for status in statuses)
@@ -137,7 +134,8 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
             "docs/diagnostics.md explains each status.",
         )
     if log.diagnostics and not troubles:
-        yield Finding(Level.GOOD, "Diagnostics", "No warning and no error.")
+        except_for = " except for the start, pauses and the e-stop" if not_ok else ""
+        yield Finding(Level.GOOD, "Diagnostics", f"No warning and no error{except_for}.")
 
 
 def _told_elsewhere(status: Status) -> bool:

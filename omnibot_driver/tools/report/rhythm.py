@@ -133,7 +133,8 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
     true = (missing >= 1.0) & np.array(told, dtype=bool)
     gap_at_s, gap_s, missing = at_s[wide[true]], steps_s[wide[true]], missing[true]
     if len(stamped) and (ended := _ended(log, stamped, stream)) is not None:
-        gap_at_s, gap_s = np.append(gap_at_s, ended.begin_s), np.append(gap_s, ended.length_s)
+        gap_at_s = np.append(gap_at_s, stamped.stamp_s[-1])
+        gap_s = np.append(gap_s, ended.length_s)
         missing = np.append(missing, np.rint(ended.length_s / period_s))
     return FrameSchedule(
         at_s=at_s,
