@@ -112,10 +112,7 @@ def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> 
 
 
 def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
-    """The user resets the odometry.
-
-    The board's own odometry begins at zero where the robot stands.
-    """
+    """The user resets the odometry. The board's own odometry then begins at zero."""
     bench.drive_on()
     bench.run(1.5)
     assert bench.odometry[-1].pose.x_m > 0.1

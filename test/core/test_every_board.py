@@ -74,7 +74,7 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
     """The user stops sending commands.
 
-    After the timeout, the robot stands and does not start again.
+    After the timeout, the robot stops and does not start again.
     """
     bench.drive_on()
     assert not bench.robot.stands
@@ -102,7 +102,7 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 ) -> None:
     """This process stalls for up to 9 s while the robot drives, and the board's data waits unread.
 
-    After each stall the robot stands, until a new command moves it.
+    After each stall the robot stops, and stays at rest until a new command moves it.
     """
     for seconds in (0.5, 9.0, 2.0):
         bench.drive_on()
@@ -233,7 +233,7 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 @pytest.mark.slow
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench) -> None:
-    """The line is cut at random moments while the robot drives, reverses and stands.
+    """The line is cut at random moments while the robot drives, reverses and rests.
 
     The odometry stays finite and plausible.
     """

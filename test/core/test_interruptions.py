@@ -28,7 +28,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", [0, 3, 5])
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The board is paused during a drive, and the robot rolls until it stands.
+    """The board is paused during a drive, and the robot rolls until it stops.
 
     In half of the tests, all frames of the pause are lost. One second later, odom is right.
     """

@@ -55,7 +55,7 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task runs while the robot is at rest. The task is not ended, because no drive was stopped.
+    """A task runs while the robot is at rest. This is not a stop of a drive, so the task continues.
 
     If the robot is driven and then stopped, the task ends.
     """

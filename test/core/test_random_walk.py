@@ -246,7 +246,7 @@ STEPS = st.lists(
 def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wanted_mode(
     steps: list[tuple[str, float]], seed: int, latency_s: float, run: bool, boot_time_s: float
 ) -> None:
-    """After any requests, commands and faults, the robot stands and the board has the wanted mode.
+    """After any requests, commands and faults, the robot rests and the board has the wanted mode.
 
     Every request is answered in time. P goes only to a board that is known to run.
     """

@@ -231,7 +231,7 @@ def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
     """A pause has failed, and the user resets the board. Afterwards the driver starts the board.
 
-    The robot stands until a new command arrives.
+    The robot does not move until a new command arrives.
     """
     bench = driving()
     bench.hears = False

@@ -116,7 +116,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 def test_what_the_old_scale_rounded_to_nothing_does_not_become_motion() -> None:
     """A speed is rounded to 0 on the line, and is a motion with the new scale.
 
-    The robot stands until another command arrives. That command begins its ramp at rest.
+    The robot is at rest until another command arrives. The ramp of that command begins at zero.
     """
     limits = SpeedLimits(linear_mps2=0.1)
     bench = Bench(BoardSettings(running=True), limits=limits)

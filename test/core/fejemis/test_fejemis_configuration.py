@@ -161,7 +161,8 @@ def test_a_small_change_by_the_user_is_written() -> None:
 def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
     """The user changes a radius by 0.3 mm, and the line that writes it is damaged on its way.
 
-    The board reports the old radius with four decimals. This is not the new one, rounded.
+    The board then reports the old radius with four decimals. The driver notices that this value is
+    not the rounded new radius, and writes the new radius again.
     """
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
@@ -194,7 +195,10 @@ def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
 def test_a_number_counts_as_written_if_only_the_boards_rounding_hides_it(
     text: str, *, agrees: bool
 ) -> None:
-    """The board prints more or fewer decimals than the user has set."""
+    """The board prints a value with more or fewer decimals than the user has set.
+
+    If only rounding explains the difference, the value counts as written.
+    """
     configuration = Configuration("drive", {Written.WHEELS: (0.07724, 0.07776, 19.0, 68.0, 0.4)})
     configuration.due(0.0, stands=True)
     for _ in range(2):

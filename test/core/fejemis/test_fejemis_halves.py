@@ -215,8 +215,8 @@ def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
 ) -> None:
     """One board never sends anything, or both ports lead to a drive board.
 
-    Stop is sent for 5 s at most. Afterwards, the driver sends only the Stops with which it tries to
-    start the robot, twice in a second. A latched e-stop is repeated 20 times in a second.
+    The driver sends Stop for 5 s at most. Afterwards, it tries to start the robot twice a second,
+    and sends a Stop only with each try. A latched e-stop is repeated 20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks

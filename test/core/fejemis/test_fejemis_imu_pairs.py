@@ -293,7 +293,7 @@ def test_no_pair_has_lines_of_two_samples(
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """The drive board is silent for a while, and then sends samples and poses again.
 
-    Two cases: its first message is a sample, or it is a pose. The time of a sample before the first
+    The first message after the silence is a sample or a pose. The time of a sample before the first
     pose is unknown, so the driver leaves this sample out.
     """
     bench = nominal()

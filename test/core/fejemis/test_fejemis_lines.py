@@ -150,7 +150,7 @@ def test_what_no_board_sends_is_not_a_message(text: str) -> None:
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("sums", [False, True])
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
-    """The same bytes arrive at once, byte by byte or in random pieces.
+    """The same bytes arrive in one piece, byte by byte or in random pieces.
 
     In each case, the decoder returns the same messages.
     """
@@ -224,7 +224,7 @@ def test_the_limit_of_a_line_does_not_depend_on_the_chunking(
 ) -> None:
     """Lines of about 200 characters arrive in any pieces, even with the line end in another piece.
 
-    The decoder returns the same messages and counts as if all bytes arrived at once.
+    The decoder returns the same messages and counts as if all bytes arrived in one piece.
     """
     stream = b"\n".join(lines)
     whole, split = FejemisDecoder(), FejemisDecoder()

@@ -131,7 +131,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """Another program sets the board's pose to zero (``enc0``). The pose of the odometry stays."""
+    """Another program sets the board's pose to zero (``enc0``). The odometry does not jump."""
     drive = Drive()
     drive.run(0.5, 0.2, 4.0)
     before = drive.out

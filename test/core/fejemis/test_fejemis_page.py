@@ -209,7 +209,7 @@ def said_by_the_driver() -> set[str]:
     bench.board.services.set_brush(True, bench.now)
     bench.board.services.set_led(255, 128, 0, bench.now)
     bench.settle()
-    # A parameter that sets its offsets would forbid the calibration of the accelerometer.
+    # A parameter that sets the accelerometer's offsets would forbid its calibration.
     bench.board.settings = FejemisSettings()
     for job in Job:
         ask(bench, job)

@@ -53,9 +53,10 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 @pytest.mark.parametrize("closes", [False, True])
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
-    """The boards fall silent, and ~/start ends a running power off. Perhaps the ports close then.
+    """During a power off, the boards fall silent, and the user calls ~/start.
 
-    The result of the power off does not come from the boards, so it does not confirm ~/start.
+    ~/start ends the power off, which fails. The boards have sent nothing, so ~/start is not
+    confirmed. ``closes``: whether the ports then close.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)

@@ -141,8 +141,8 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
     """The drive board restarts while only its port is away, and the computer stalls meanwhile.
 
-    No line of the new connection has waited for the end of the stall. So a line that seems late
-    shows the restart, and the odometry does not jump.
+    The stall ends before the port is back, so it has delayed no line of the new connection. If such
+    a line seems late, the board has restarted. So the odometry does not jump.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)

@@ -38,7 +38,10 @@ def test_all_sensors_are_told_in_si_units() -> None:
 
 @pytest.mark.slow
 def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
-    """The port is lost while the robot turns at 1 rad/s. It is back after the robot has stopped."""
+    """The port is lost while the robot turns at 1 rad/s, and opens after the robot has stopped.
+
+    The next orientations have a turn rate of about zero, not of 1 rad/s.
+    """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     assert bench.extras(OrientedImuReading)[-1].angular_velocity[2] > 0.9
@@ -56,7 +59,10 @@ def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
 
 
 def test_an_orientation_without_a_recent_imu_sample_is_not_published() -> None:
-    """The gyro's lines are lost, but the orientations arrive. The last turn rate is not used."""
+    """The gyro's lines are lost, but the orientations arrive, and are not published.
+
+    The last turn rate is too old for them.
+    """
     bench = nominal()
     bench.robot.drive._items["gyro"] = lambda: "lost"
     bench.run(0.1)

@@ -8,7 +8,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 from omnibot_driver.core.geometry.se2 import Pose
 
 READ = 4095
-"""Largest number of bytes that wait in a terminal's buffer. One read returns at most as many."""
+"""Largest number of bytes that wait in a terminal's buffer. A read returns at most this many."""
 EVERYTHING = 10**6
 
 

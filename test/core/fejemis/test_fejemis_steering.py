@@ -205,7 +205,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
     """A turn on the spot to the left is followed by one to the right.
 
-    The robot stands while the front wheel turns by 180°, which takes over 1 s.
+    The robot is at rest while the front wheel turns by 180°, which takes over 1 s.
     """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 1.5)

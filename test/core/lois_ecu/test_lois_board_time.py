@@ -112,8 +112,8 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """All reads are in time. Then the board's clock jumps by 0.05 s or 0.2 s, ahead or back.
 
-    The estimated delay of the next tick report changes by as much, and is regarded as irregular.
-    Without the jump, it is not.
+    The estimated delay of the next tick report changes by the amount of the jump, and is regarded
+    as irregular. Without the jump, the delay is not irregular.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

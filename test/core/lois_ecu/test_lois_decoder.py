@@ -41,7 +41,7 @@ def rounded(found: list[Report]) -> list[bytes]:
 
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> None:
-    """A stream is decoded at once, byte by byte or cut at random places.
+    """A stream is decoded in one piece, byte by byte or cut at random places.
 
     The reports are the same.
     """

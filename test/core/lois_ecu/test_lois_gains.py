@@ -59,10 +59,10 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 
 @pytest.mark.slow
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
-    """The lines of each round arrive without a pause between them.
+    """The driver writes its settings in rounds. The lines of a round arrive without a pause.
 
-    The board sends the requested date at once, and loses what arrives meanwhile. Every setting
-    still reaches the board.
+    The last line of a round requests a date. The board sends this date at once, and loses what
+    arrives meanwhile. Every setting still reaches the board.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
@@ -77,7 +77,10 @@ def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None
 
 
 def test_no_line_follows_the_request_for_a_date_directly() -> None:
-    """The next round begins at least 20 ms later, so the board can answer before."""
+    """The last line of a round requests a date. The next line follows at least 20 ms later.
+
+    In this time, the board can answer. While it sends, it receives nothing.
+    """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)
     sent: list[tuple[float, bytes]] = []
@@ -93,7 +96,10 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 
 @pytest.mark.slow
 def test_a_wheel_that_does_not_start_gets_its_settings_again_at_rest() -> None:
-    """The board lost the low-pass, so the wheels do not turn. The next drive moves the robot."""
+    """The board has lost its low-pass gain, so the wheels do not turn.
+
+    The driver writes the settings again at rest. The next drive moves the robot.
+    """
     bench = Bench("firmware", HOST_GAINS)
     for wheel in bench.board.wheels:
         wheel.controller.change(low_pass=0.0)

@@ -46,7 +46,10 @@ def read(late_reads: LateReads, now: float, *reports: Report) -> tuple[float, ..
 
 
 def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows() -> None:
-    """Four reports come in a read that is 0.6 s late. Each gets the time at which it arrived."""
+    """Four reports come in a read that is 0.6 s late. Their times are 0.2 s apart, as in the board.
+
+    The last report has the time of the read.
+    """
     found = read(listening(), 2.6, *ticks(2000, 2200, 2400, 2600))
     assert found == about(2.0, 2.2, 2.4, 2.6)
 
@@ -72,7 +75,10 @@ def test_a_backlog_may_come_in_several_reads() -> None:
 
 
 def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
-    """Only tick reports have a clock. The board sends other reports directly after them."""
+    """Only tick reports contain the board's time. Another report gets the time of the last ticks.
+
+    The board sends other reports directly after ticks.
+    """
     found = read(listening(), 2.4, *ticks(2000), GpsTime(1, 2, 3), *ticks(2200, 2400))
     assert found == about(2.0, 2.0, 2.2, 2.4)
 
@@ -200,7 +206,8 @@ def true_pose(bench: Bench) -> Pose:
 def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
     """The driver stalls for seconds during a drive, and then reads all reports at once.
 
-    The twist is never that of a robot which drove the whole way in an instant.
+    The twist is that of the drive. It is never so high as if the robot had driven the whole
+    distance at once.
     """
     bench = Bench(firmware)
     error_m, _ = stalled_drive(bench, stall_s)

@@ -71,7 +71,7 @@ def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
 
 @BOTH
 def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
-    """The robot is at rest, but the board still reports its old velocity. The pose stays."""
+    """The robot is at rest, but the board still reports its old velocity. The pose is constant."""
     rig = settled(firmware)
     rig.order(20, 25, 4.0)
     rig.order(0, 0, 2.0)

@@ -87,9 +87,9 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 
 
 def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_motion() -> None:
-    """The counts 5 were sent before a reset. The wheels then roll out, so the next counts are 3.
+    """Tick counts of 5 are sent before a reset. The wheels then roll out to counts of 3.
 
-    The smaller counts do not show that the board counts backward.
+    The driver does not conclude from the smaller counts that the board counts backward.
     """
     translation = Translation(LoisEcuSettings())
     translation.reset()

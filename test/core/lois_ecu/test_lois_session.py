@@ -190,7 +190,8 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
     """For 1.2 s the board sends only a record while the robot drives.
 
-    The record arrives complete. (Wheels of many ticks fill it sooner.)
+    The record arrives complete. The encoders have 120 ticks per turn, so that the record of 1024
+    samples is full soon.
     """
     bench = Bench(firmware, LoisEcuSettings(ticks_per_revolution=120), steps=120)
     bench.drive_on(0.6, 2.0)
@@ -358,10 +359,10 @@ def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
 @FIRMWARE
 @pytest.mark.slow
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped(firmware: str) -> None:
-    """The robot drives at 0.8 m/s, but it is commanded 0.2 m/s and can reach 0.6 m/s at most.
+    """A robot drives at 0.8 m/s. The command is 0.2 m/s, and the set limit 0.6 m/s.
 
-    All displacements are impossible. One of them may be a correction of the odometry, but not four
-    in a row, so the driver stops the robot.
+    So all displacements seem impossible. A single one could be a correction of the odometry, but
+    four in a row are a fault: the driver stops the robot.
     """
     bench = Bench(firmware)
     bench.session.configure(replace(SETTINGS, motion=MotionLimits(fastest_mps=0.6)), bench.now)

@@ -200,7 +200,7 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     """A wheel's reported speed stays the same while that of the other wheel varies.
 
     So the wheel may be at rest. But its speed is high, so it may also still roll. The driver sends
-    RPM 0/0 to start the wheel anew, and the odometry keeps the distance that the wheel has rolled.
+    RPM 0/0 to start the wheel again, and the odometry keeps the distance that the wheel has rolled.
 
     ``right_rpm``: reported speed of the wheel. Its set-point is −31 RPM. A speed of −68 RPM is that
     of a wheel whose saturated controller keeps full power.
@@ -231,7 +231,9 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """After a forward drive, the wheels are blocked and commanded backward. The pose stays.
+    """After a forward drive, the wheels are blocked and commanded backward.
+
+    The pose then moves less than 0.15 m.
 
     ``reset``: whether the odometry is reset before the backward command.
     """

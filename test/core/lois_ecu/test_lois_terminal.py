@@ -189,7 +189,8 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
     """The user sets duty mode in a forward drive, and then drives backward.
 
-    After Stop, the public firmware would count the ticks of this motion forward.
+    A Stop does not change the RPM target of the public firmware. While this target is positive, the
+    firmware counts all ticks as forward. So the driver clears the target before it drives by duty.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)

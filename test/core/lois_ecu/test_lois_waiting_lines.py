@@ -74,8 +74,8 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """The LED is switched while the robot drives.
 
-    The LED's line is sent at least 14.5 ms after a motion line. The board may miss the bytes of
-    13 ms. If it missed the end of the motion line and the beginning of the LED's line, it could
+    The LED's line is sent at least 14.5 ms after a motion line. The board may miss all bytes for up
+    to 13 ms. If it missed the end of the motion line and the beginning of the LED's line, it could
     read the remaining bytes as a wrong motion line.
     """
     bench = Bench("firmware")

@@ -41,7 +41,7 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""Largest number of disturbed datagrams in each direction, divided by the number of wishes.
+"""The search disturbs at most this many datagrams for each wish, in each direction.
 
 Each of these datagrams is disturbed in a trial of its own. Regular queries and their replies are
 not counted.

@@ -238,8 +238,8 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
     """A gyro calibration ends with ``ok``. The request that starts the log is lost.
 
-    A copy of the ``ok`` arrives. The driver does not take it for the reply to LOG, so it does not
-    end a server that keeps no log.
+    A copy of the ``ok`` arrives. The driver does not take it for the reply to LOG. So it later
+    refuses to download a log, which would end the server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success

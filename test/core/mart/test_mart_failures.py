@@ -247,7 +247,7 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """The server rejects a forward drive (RM). Five seconds later, somebody pushes the robot.
+    """The server rejects a forward drive (RM). Five seconds later, a person pushes the robot.
 
     A defective server moves the robot although it rejects RM, but at once. This motion came later,
     so motion stays allowed.

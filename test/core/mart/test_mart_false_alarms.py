@@ -139,7 +139,7 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn has a wrong rate, so the driver stops it and begins it anew.
+    """A turn has a wrong rate, so the driver stops it and starts it again.
 
     The stop takes long, or its reply is late, so the reply gives no angle. Instead, the driver
     learns the motors' speed from the encoder. So the new turn has other motor units.
@@ -161,7 +161,7 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     """The wheels of a heavy robot turn for 1.3 s after a stop.
 
     The server waits 0.6 s for them, and reports a failure. The driver does not report that the
-    robot moves without a command. Every other stop is an e-stop.
+    robot moves without a command. Every second stop is an e-stop.
     """
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):

@@ -317,7 +317,8 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
     """A goal is 30 m away. The driver stops the straight move after 80 s, which is about 20 m.
 
-    The moves to the goal are counted anew from then on, so a goal at any distance can be reached.
+    From then on, the driver counts the moves to the goal from zero again. So a goal at any distance
+    can be reached.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

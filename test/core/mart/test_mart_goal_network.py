@@ -105,7 +105,7 @@ def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
 def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
     degrees: float, delay_s: float, firmware: Firmware
 ) -> None:
-    """The server runs a turn twice. The driver stops the second run, or comes too late for it.
+    """The server runs a turn twice. The driver stops the second run, or is too late to stop it.
 
     In both cases, the covariance covers the error of the heading.
     """

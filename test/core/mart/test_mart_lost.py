@@ -69,8 +69,8 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 ) -> None:
     """The IMU works again, so the server answers all waiting requests at once.
 
-    Its name can then arrive before the reply to the stop in which it hung. This reply decides that
-    the driver refuses motion.
+    The server hung in a stop, and answers it only after the driver has used the stop port. So the
+    stop port hangs, and the driver refuses motion, even if the server's name arrives first.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -170,7 +170,7 @@ def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
 def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
     away_s: float, firmware: Firmware
 ) -> None:
-    """Only the right wheel has an encoder. It stands while the robot turns about it.
+    """Only the right wheel has an encoder. This wheel rests while the robot turns about it.
 
     The driver finds that the server has a motion in progress, so it sends SL and SS, and repeats
     them.

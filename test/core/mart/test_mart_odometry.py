@@ -229,9 +229,9 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """The reply to a change of speed (RMCS) has the same angle as the last reply with a heading.
+    """The replies to RMRA (heading query) and then to RMCS (change of speed) have the same angle.
 
-    The reply to RMCS is not taken for a copy of that reply to the heading query (RMRA).
+    The driver does not take the reply to RMCS for a copy of the reply to RMRA.
     """
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)

@@ -25,8 +25,8 @@ def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> N
     """One datagram is lost, late or doubled. The server does not hang, and the robot rests.
 
     If the IMU dies instead, no motion begins more than 0.25 s later, and the robot rests or the
-    server is reported lost. The trials of the eight seeds include each fault, and each wish as the
-    first of their two wishes.
+    server is reported lost. Each seed is one trial with two wishes. The eight seeds together
+    include each of the four faults, and each wish as the first wish of a trial.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))

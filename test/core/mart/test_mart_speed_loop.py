@@ -38,11 +38,11 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """A motor turns from the first unit on, but its speed at 26 units is measured too low.
+    """The measured speed of a motor is right at 18 units, and too low at 26 units.
 
-    A straight line through the measured speeds would show motion at zero units, which is
-    impossible. The driver's line excludes this, and so is too low at 14 units. Then the true speed
-    is measured there, which is higher. This measurement must not lower the line.
+    A straight line through both speeds would show motion at zero units, which is impossible. The
+    driver's line shows no such motion, but is too low at 14 units. Then the true, higher speed at
+    14 units is measured. This measurement must not lower the line there.
     """
     line = MotorLine()
     for _ in range(8):

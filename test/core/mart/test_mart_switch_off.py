@@ -334,8 +334,8 @@ def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> 
     """The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM.
 
     The ``ok`` to MSM arrives twice, and the next check of the IMU (RST IMU) is lost. The driver
-    does not take the second ``ok`` for the reply to the check. It reports that the robot is at
-    rest, but the server still reports a motion.
+    does not take the second ``ok`` for the reply to the check. Its notice says that the server
+    still reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -86,9 +86,10 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_closed(
     bench: Bench,
 ) -> None:
-    """A cable is lost and the robot is pushed. The data after the gap will show this motion.
+    """The connection is lost and the robot is pushed. Later data will show this motion.
 
-    So a reset would not be true. It is refused until data arrive again, and then succeeds.
+    So odom would not stay at zero after a reset. The reset is refused until data arrives again.
+    Then it succeeds.
     """
     bench.speaks = False
     bench.run(2.0)

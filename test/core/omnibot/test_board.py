@@ -76,7 +76,7 @@ def test_a_delta_is_in_tenths_of_millimetres_and_milliradians_over_40_ms() -> No
 
 
 def test_the_frame_of_the_deltas_is_the_settings() -> None:
-    """The board does not say in which coordinate frame its deltas are, so a setting says it."""
+    """The board does not say in which coordinate frame its deltas are, so a setting selects it."""
     (reading,) = readings(bot(delta_frame="body"), moved(0))
     assert isinstance(reading, DisplacementReading)
     assert reading.frame == "body"

@@ -177,7 +177,7 @@ def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
 ) -> None:
     """Decoding starts at any of the first 345 bytes. All frames but at most two are returned.
 
-    If the bytes come in ticks or one by one, it starts at some of them only.
+    For bytes that come in ticks or one by one, the test starts at every 9th or 23rd byte only.
     """
     ticks = ticks_of(name)[:40]
     stream = b"".join(ticks)

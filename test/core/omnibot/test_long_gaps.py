@@ -83,7 +83,7 @@ def test_a_long_gap_that_ends_with_a_pose_is_not_bridged(gap_s: float, frame: st
 @pytest.mark.slow
 @pytest.mark.parametrize("gap_s", [3, 8])
 def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: int) -> None:
-    """The robot moves in a long gap, and then stands. Some poses arrive before the next delta.
+    """The robot moves in a long gap, and then stops. Some poses arrive before the next delta.
 
     The first of these poses shows the motion, so odom is right.
     """

@@ -25,7 +25,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 @cache
 def over_a_gap(lost: int, seed: int, frame: str) -> tuple[Line, list[OdometryEstimate]]:
-    """Return a line 1 s after a gap, with the estimates from the last one before the gap on."""
+    """Return a line 1 s after a gap, and its estimates since the gap began.
+
+    The first of these estimates is the last one before the gap.
+    """
     on = line(seed, frame=frame)
     before = on.estimates[-1]
     lose(on, lost * PERIOD_S)

@@ -153,8 +153,8 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
     """More than 1 s of deltas are lost, and then a pose arrives before the next delta.
 
-    The pose shows the losses. It shows no restart, although the last delta before the gap may
-    happen to have a count near five times that of the pose.
+    The pose shows the losses. By chance, five times its count may be near the count of the last
+    delta, as after a restart. After such a long gap, this is not taken for a restart.
     """
     sequence = Sequence()
     for count in range(300):

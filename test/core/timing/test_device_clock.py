@@ -270,7 +270,7 @@ def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> Non
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
     """The board is silent for five seconds, and its counter SEQ does not show this.
 
-    The fitted clock begins anew, and the stamps are right.
+    The fitted clock starts again, and the stamps are right.
     """
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
