@@ -229,7 +229,7 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
     1 mm/s.
 
     The outer wheel becomes faster only if this character is a decimal point or a digit of the
-    speed. It changes its direction only if the character is the minus sign.
+    speed. The wheel changes its direction only if the character is the minus sign.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):

@@ -122,7 +122,7 @@ def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() ->
 @pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.SAVE, Job.LOAD, Job.POWER_OFF])
 def test_boards_that_fall_silent_do_not_delay_an_answer(job: Job) -> None:
-    """Both boards fall silent after the request. It fails within 5 s."""
+    """Both boards fall silent after the request. The request fails within 5 s."""
     bench = nominal()
     bench.run(1.5)
     bench.speaks.clear()

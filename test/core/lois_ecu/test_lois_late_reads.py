@@ -46,10 +46,7 @@ def read(late_reads: LateReads, now: float, *reports: Report) -> tuple[float, ..
 
 
 def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows() -> None:
-    """Four reports come in a read that is 0.6 s late. Their times are 0.2 s apart, as in the board.
-
-    The last report has the time of the read.
-    """
+    """Four reports come in one read. Their times are 0.2 s apart, as the board's clock shows."""
     found = read(listening(), 2.6, *ticks(2000, 2200, 2400, 2600))
     assert found == about(2.0, 2.2, 2.4, 2.6)
 
@@ -75,10 +72,7 @@ def test_a_backlog_may_come_in_several_reads() -> None:
 
 
 def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
-    """Only tick reports contain the board's time. Another report gets the time of the last ticks.
-
-    The board sends other reports directly after ticks.
-    """
+    """A GPS report has no clock. The board sends it directly after ticks, so it gets their time."""
     found = read(listening(), 2.4, *ticks(2000), GpsTime(1, 2, 3), *ticks(2200, 2400))
     assert found == about(2.0, 2.0, 2.2, 2.4)
 
@@ -206,8 +200,7 @@ def true_pose(bench: Bench) -> Pose:
 def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
     """The driver stalls for seconds during a drive, and then reads all reports at once.
 
-    The twist is that of the drive. It is never so high as if the robot had driven the whole
-    distance at once.
+    The twist is never so high as if the robot had driven the whole distance in an instant.
     """
     bench = Bench(firmware)
     error_m, _ = stalled_drive(bench, stall_s)

@@ -122,9 +122,10 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects a forward drive (RM). It names the obstacle that ended a backward drive.
+    """The server rejects a forward drive (RM), and gives an old error as the reason.
 
-    The front sonar shows no obstacle, so the driver repeats RM.
+    The old error is an obstacle that ended a backward drive. The front sonar shows no obstacle, so
+    the driver repeats RM.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
@@ -249,8 +250,8 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
     """The server rejects a forward drive (RM). Five seconds later, a person pushes the robot.
 
-    A defective server moves the robot although it rejects RM, but at once. This motion came later,
-    so motion stays allowed.
+    A defective server rejects RM, and moves the robot immediately. This motion comes much later, so
+    the driver still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58

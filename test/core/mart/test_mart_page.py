@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test that docs/boards/mart.md has a row for each command: where the driver uses it, or why not."""
+"""Test that docs/boards/mart.md shows where the driver uses each command, or why not."""
 
 import re
 from pathlib import Path

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of a controlled turn comes from the server's record, if the server has one."""
+"""The angle of a controlled turn comes from the server's record, if it keeps such records."""
 
 import math
 from typing import Any

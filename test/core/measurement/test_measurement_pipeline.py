@@ -66,8 +66,8 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
     """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
 
-    It may be up to 20 mm too long, but never too short, because the first displacement after the
-    reset also contains the motion that the board had not reported before.
+    This distance may be up to 20 mm too long, but never too short. The reason is that the first
+    displacement after the reset also contains motion that the board had not reported before.
     """
     for _ in range(10):
         bench.drive(0.5)

@@ -129,7 +129,7 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """An IMU frame of a knock arrives in two parts, and then nothing arrives. It is returned."""
+    """An IMU frame of a knock arrives in two parts, and then a silence. The frame is returned."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
