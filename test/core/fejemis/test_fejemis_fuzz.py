@@ -19,7 +19,7 @@ from omnibot_driver.core.requests import Request
 
 
 def any_line(chance: random.Random) -> bytes:
-    """Return a line that one of the boards could send, often damaged, or random bytes."""
+    """Return random bytes, or a line that one of the boards could send, often damaged."""
     text = chance.choice(list(GOLDEN)).encode()
     fields = text.split()
     for at in range(1, len(fields)):

@@ -276,9 +276,9 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """The boards send help text and an unknown line, and the robot still obeys commands.
+    """The boards send help text, and report that they do not know a line that they have received.
 
-    The diagnostics show the unknown line.
+    The robot still obeys commands. The diagnostics show the unknown line.
     """
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
@@ -291,7 +291,7 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
 def test_the_diagnostics_show_the_latest_unknown_lines() -> None:
     """The drive board receives four lines that it does not know, and then the first one again.
 
-    The diagnostics show the latest three of these lines, each of them once.
+    It reports each unknown line. The diagnostics show the latest three, each only once.
     """
     bench = nominal()
     bench.robot.receive(b"wa\nwb\nwc\nwd\nwa\n", bench.now, DRIVE)

@@ -267,7 +267,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
     """A board was silent, so the driver requests its heartbeat ten times a second.
 
-    The periodic heartbeats come only every 0.4 s. The requested one shows a restart earlier.
+    The periodic heartbeats come only every 0.4 s. A requested heartbeat shows a restart earlier.
     """
     bench = nominal()
     bench.speaks = {DRIVE}

@@ -202,9 +202,9 @@ def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None
 
 
 def test_a_start_of_a_driven_robot_interrupts_its_motion_only_for_a_moment() -> None:
-    """The user calls ~/start while the robot drives. The command is repeated once in a second.
+    """The user calls ~/start while the robot drives, and the command rate is 1 Hz.
 
-    A Stop precedes ``start``. The motion command follows at once.
+    A Stop precedes ``start``. The motion command follows immediately, and not after up to 1 s.
     """
     bench = nominal(commands=CommandSettings(timeout_s=60.0, rate_hz=1.0))
     bench.drive()

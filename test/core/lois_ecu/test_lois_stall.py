@@ -60,7 +60,7 @@ def test_wheels_that_tick_do_not() -> None:
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """A wheel is commanded backward, and the public firmware counts no ticks of it.
+    """A wheel is commanded backward, and the public firmware does not count its ticks.
 
     A stall is reported if the reported pose does not change.
     """

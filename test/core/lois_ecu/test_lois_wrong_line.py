@@ -60,7 +60,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
 def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     firmware: str, *, checks: bool
 ) -> None:
-    """Driver and board differ in the setting for checksums. The driver corrects the board's."""
+    """The board has a wrong setting for checksums. The driver corrects this setting."""
     _, robot = MAKERS[firmware]()
     robot.board._reader.checks = not checks
     bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)

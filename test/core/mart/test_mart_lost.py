@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a server that was lost: the driver uses the stop port, and then asks what moves."""
+"""Tests of a lost server: the driver uses the stop port, and then asks which motion runs."""
 
 import pytest
 from mart_bench import MartBench

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A sample of the bounded search that runs the real driver. ``real_search`` runs all of it."""
+"""A sample of the bounded search that runs the real driver. ``real_search`` runs all trials."""
 
 from collections.abc import Callable
 from random import Random
