@@ -43,9 +43,8 @@ WAITING = ("faults", "system", "tools")
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Let parallel workers begin with the longest files, then alternate between two kinds of files.
 
-    The tests in files of one kind wait, and those in files of the other kind compute. Tests that
-    wait leave computing time for tests that compute. Otherwise the drivers of many waiting tests
-    would run at once, and starve.
+    The tests in files of one kind wait in real time, and those in files of the other kind compute.
+    If many waiting tests ran at once, their drivers would get too little processor time.
     """
     if not hasattr(config, "workerinput"):
         return

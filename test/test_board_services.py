@@ -49,9 +49,9 @@ class Services:
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_a_driver_that_shuts_down_refuses_all_services_of_the_board(board: str) -> None:
-    """The driver shuts down, and stops the robot. It no longer sends what a service asks for.
+    """The driver shuts down. Every service that only this board has is refused.
 
-    So each service that only this board has is refused, and the answer says why.
+    The answer of each service gives the reason.
     """
     bench = nominal(board)
     services = Services(board, bench)

@@ -137,9 +137,10 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
-    """The text of ``gyro_bias`` says that ``~/calibrate_gyro`` measures it, if that is true.
+    """The description of ``gyro_bias`` says that ``~/calibrate_gyro`` measures this bias.
 
-    Only the OmniBot's parameter table quotes the noise of an IMU.
+    If the board itself subtracts the bias, the description does not say this. Only the OmniBot's
+    parameter table quotes the noise of an IMU.
     """
     profile = boards.load(name)
     traits = profile.make(boards.check_all({"board": name})).traits

@@ -175,7 +175,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
 ) -> None:
     """The guard cannot be killed when the driver ends. The driver waits only for a short time.
 
-    A suspended process takes the place of such a guard.
+    In this test, the guard is suspended, and the driver's ``kill`` has no effect.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

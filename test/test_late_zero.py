@@ -59,7 +59,7 @@ class Topic:
         )
 
     def hear(self, vx: float = 0.0, *, late_s: float = 0.0) -> None:
-        """Let a velocity in m/s arrive that was sent ``late_s`` ago."""
+        """Deliver a message with the velocity ``vx``, in m/s. It was sent ``late_s`` ago."""
         now_ns = self._now_ns()
         twist = Twist()
         twist.linear.x = vx
@@ -78,7 +78,10 @@ def source(bench: Any) -> str | None:
 
 
 def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
-    """Return a MART that drives to a goal, and the topic on which a zero arrived before."""
+    """Return a MART that drives to a goal, and its topic cmd_vel.
+
+    A zero command arrived on this topic before the goal.
+    """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)
     topic.hear()

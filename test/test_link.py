@@ -73,8 +73,8 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 ) -> None:
     """The guard gets at most ten heartbeats per second, although the pacer thread runs more often.
 
-    The driver counts unread heartbeats to notice a guard that hangs. At a higher rate, it would
-    conclude this too early.
+    The driver regards a guard with many unread heartbeats as hung. If heartbeats were sent at a
+    higher rate, the driver would replace a guard that is only slow.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -146,9 +146,10 @@ class SlowShutdown:
 def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proofs(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Displacements come once a second. The first proof comes at the last moment, the second never.
+    """Displacements are rare, so a proof that the robot is at rest needs the longest possible wait.
 
-    The waits and the guard's last words together take less time than the process has for its end.
+    The first proof comes at the last moment, and the second one does not come. Both waits and the
+    guard's last words together are shorter than the time limit for the driver's end.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S

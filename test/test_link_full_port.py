@@ -78,7 +78,8 @@ def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
 ) -> None:
     """The board is silent, so the link closes without a proof of rest, and the guard repeats Stop.
 
-    If the port is full, old commands are in it, and the guard discards them.
+    If the port accepted the link's last packets, they may still be in its buffer, so the guard
+    keeps them. A full port contains old commands, so the guard discards these.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

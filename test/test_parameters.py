@@ -114,7 +114,7 @@ def test_every_default_passes_its_own_check_and_is_explained(parameter: Paramete
 
 
 def test_names_are_unique() -> None:
-    """Each parameter name is in the table once. Of two rows with one name, one would be hidden."""
+    """Each parameter name is in the table once. A second row would hide the first one."""
     assert len(PARAMETERS.by_name) == len(PARAMETERS.rows)
 
 

@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 from stuck import TAKES_NOTHING
 
 OLD_GOAL: Final = bytes.fromhex("FF FE 01 7F FF 7F FF 00 00")
-"""The frame with the farthest goal that a frame can contain."""
+"""A command to drive to the goal with the largest x and y that a frame can contain."""
 UNHEARD_S: Final = 0.3
 """Time in s without data from the board after which the driver no longer drives the robot."""
 HANGS_S: Final = 1.0

@@ -21,10 +21,11 @@ LEFT_OUT = {
     "~/pause and un-pause",
     "the driver hangs and goes on (SIGSTOP, SIGCONT)",
 }
-"""Cases that are not tested here, because they are similar to others here or in test/system.
+"""Cases that this module omits, because it or test/system has a test of a similar case.
 
-The last four are in test_driver_commands, test_driver_services and test_driver_guard, and
-"1,000 releases a second by topic" is here. ``make faults`` runs all cases.
+The last four cases are similar to tests in test_driver_commands, test_driver_services and
+test_driver_guard. "e-stop by topic" is also similar to "1,000 releases a second by topic", which
+this module tests. ``make faults`` runs all cases.
 """
 CASES = {
     name: case for name, case in survivable(seed=0, damaged_s=1.0).items() if name not in LEFT_OUT

@@ -13,14 +13,17 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Largest number of intact frames that the judge skips without further evidence.
+"""Largest number of intact true frames that the judge skips without further evidence.
 
-It skips them to find the true frame of a decoded frame. If it skips more, the decoded frame is
-right only if the next decoded frame matches soon afterwards. This excludes false frames that happen
-to equal a much later true frame.
+For each decoded frame, the judge searches forward for an equal true frame. If it skips more intact
+frames than this number, it also searches for the next decoded frame of the same read. If that
+search, too, skips more, the decoded frame is wrong: it equals a much later true frame by chance.
 """
 REACH_BYTES = 600
-"""The search for a decoded frame's true frame begins about this number of bytes before the read."""
+"""Number of received bytes before a read at which the search for its true frames begins.
+
+The search includes 300 earlier bytes of the true stream.
+"""
 
 
 @dataclass(slots=True)

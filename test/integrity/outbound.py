@@ -24,9 +24,9 @@ from outbound_scenes import DRIVES, SCENES
 
 DOCUMENT: Final = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 OTHERWISE: Final = {
-    "lois_ecu": "outbound lines carry a checksum; tests try all losses of them",
-    "mart": "datagrams arrive whole or not at all; tests search all that their losses can do",
-    "fejemis": "outbound lines carry a sum; tests try all losses of one and two characters",
+    "lois_ecu": "outbound lines carry a checksum; tests try all losses of one and two characters",
+    "mart": "datagrams arrive complete or not at all; tests search for losses that do harm",
+    "fejemis": "outbound lines carry a checksum; tests try all losses of one and two characters",
 }
 """Boards that this report does not measure, each with the reason."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"

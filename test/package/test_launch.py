@@ -225,7 +225,7 @@ def test_the_parameter_file_is_that_of_the_board(
 ) -> None:
     """The argument ``board`` selects the parameter file.
 
-    Instead, a parameter file of the user can name the board.
+    Without this argument, a parameter file of the user can name the board.
     """
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults

@@ -28,7 +28,7 @@ from omnibot_driver.tools.report.__main__ import main as report
 
 SHOWN = ("path", "timeline", "timing", "velocities")
 REST = 75
-"""Number of odom messages during each standstill of the robot. It lasts three seconds."""
+"""Number of odom messages during each standstill. A standstill lasts three seconds."""
 STOPPED_ON_LEG = 6
 
 

@@ -96,14 +96,15 @@ def shared(_ros: None) -> Iterator[tuple["PtyBoard", Driver]]:
 def shared_probe(
     shared: tuple["PtyBoard", Driver], probe_of: Callable[[Driver], Probe]
 ) -> Iterator[Probe]:
-    """A probe of the shared driver. Before and after the test, the robot is at rest.
+    """A probe of the shared driver. After the test, the fixture latches the e-stop.
 
-    The e-stop is not latched. The lists of the commands and of the driver's output are empty.
+    At the beginning of the test, the robot is at rest, and the e-stop is not latched. The lists of
+    the commands and of the driver's output are empty.
     """
     board, driver = shared
     probe = probe_of(driver)
     probe.wait_for_state("nominal")
-    for data in (True, False):  # this discards the command of the test before
+    for data in (True, False):  # discards the command of the previous test
         assert probe.call(SetBool, "estop", data=data).success
     assert board.wait_for(lambda b: b.commands[-1].kind == "wheels", PATIENCE_S)
     with board.lock:

@@ -17,7 +17,10 @@ from typing import Any, Self
 from driver_nursery import Nursery
 
 PATIENCE_S = 120.0
-"""How long a test waits for an event before it fails, in s. No test checks how soon it comes."""
+"""How long a test waits for an event before the test fails, in s.
+
+No test checks how soon the event comes.
+"""
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     # Under nohup, children would inherit that SIGHUP is ignored; a handler is not inherited.

@@ -30,7 +30,8 @@ NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """Options that turn off the events of the middleware, for subscriptions and for publishers.
 
-The executor would add each event to every wait. This would take more time than the messages.
+The executor would wait for each of these events, too. This would take more processor time than the
+messages.
 """
 
 

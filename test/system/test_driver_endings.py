@@ -134,8 +134,9 @@ node.OmniBotDriver._on_estop_topic = hold
 join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20 * timeout)
 """
-"""Code that holds the executor's thread in a callback until the driver has asked it to end.
+"""Code that blocks the executor's thread in a callback.
 
+The callback returns when the driver has asked the executor to end.
 The code also makes the driver wait longer for its threads.
 """
 

@@ -35,9 +35,9 @@ BUSY_S = 3.0
 ATTEMPTS = 5
 STALLED = "driver stalled for"
 OVERLOADED = ("did not run for", "not overloaded")
-"""Parts of the messages in which the tool reports that the computer was too busy.
+"""Parts of the tool's error messages about a computer that is too busy.
 
-``STALLED`` is part of such a message of the driver.
+``STALLED`` is a part of the driver's log line about such a computer.
 """
 
 
@@ -63,7 +63,7 @@ class Rig:
 
         ``draws``: whether the picture is drawn, which takes a second.
 
-        If it ends with an error because the computer was too busy, it is begun again.
+        If the calibration fails because the computer was too busy, it is repeated.
         """
 
         def read(question: str) -> str:

@@ -78,7 +78,8 @@ def test_a_speed_limit_is_not_taken_for_positional_control(
 ) -> None:
     """The driver's speed limit is below the speed of the check. The tool asks for a higher limit.
 
-    Otherwise the robot would not follow the faster command, as with positional control.
+    Without this check, the robot would not drive at the speed of the faster command. The tool would
+    mistake this for positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
         assert robot.calibrate("commission", "--only", "board") == 1

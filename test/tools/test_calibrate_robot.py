@@ -61,7 +61,8 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
     log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
     after = rigged.port.board.truth
     assert rigged.port.wait_for(stands, PATIENCE_S)
-    told = np.diff(log.commands.stamp_s) @ log.commands.values[:-1, 2]  # each holds until the next
+    # Each command is in effect until the next one.
+    told = np.diff(log.commands.stamp_s) @ log.commands.values[:-1, 2]
     assert told > 0.2
     assert after.yaw_rad - before.yaw_rad == pytest.approx(told, abs=0.03)
     assert log.odometry.pose[-1, 2] - log.odometry.pose[0, 2] == pytest.approx(

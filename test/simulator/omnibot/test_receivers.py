@@ -137,9 +137,9 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A stop frame lacks a byte. The counting receiver adds the FF that begins the next frame.
+    """A stop frame lacks a byte. The counting receiver takes the next frame's first FF instead.
 
-    So wheel C turns at 255 LSB.
+    The last word of the stop frame becomes 255, so wheel C turns at 255 LSB.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
@@ -177,9 +177,9 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A stop frame lacks a byte. The window receiver adds the FF that begins the next frame.
+    """A stop frame lacks a byte. The window receiver takes the next frame's first FF instead.
 
-    This FF also begins the next frame, so the receiver finds both frames.
+    It uses the same FF again as the beginning of the next frame. So it finds both frames.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),

@@ -79,7 +79,7 @@ def test_a_brush_that_cannot_be_switched_off_now_is_no_success(
 def test_nothing_is_promised_while_both_ports_are_missing(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """Both boards are unplugged. Neither a job nor ``~/brush`` (off) is answered as a success."""
+    """Both boards are unplugged. ``~/brush`` (off) and ``~/save_configuration`` both fail."""
     robot.unplug(DRIVE)
     robot.unplug(FRONT)
     probe.wait_for_state("disconnected")

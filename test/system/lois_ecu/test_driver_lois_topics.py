@@ -29,7 +29,7 @@ NODE: Final = "omnibot_driver"
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
     """The services switch the LED on and off. The driver sends the ball command exactly once.
 
-    The board may lose it, because it hears nothing while it sends.
+    The board may miss this command, because it cannot receive while it sends.
     """
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
