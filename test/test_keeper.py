@@ -161,7 +161,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
     """The guard process is suspended when the driver ends, so it cannot read the end message.
 
-    The driver waits for it only for a short time, then kills it.
+    The driver waits only for a short time, then kills the guard.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

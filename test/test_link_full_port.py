@@ -121,9 +121,9 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
-    """A defect ends the driver while its port is full. The guard process sends Stop later.
+    """A defect ends the driver while its port is full.
 
-    It does so as soon as the port accepts data again.
+    The guard process sends Stop as soon as the port accepts data again.
     """
     link, ours = at_rest(terminal)
     terminal.fill()

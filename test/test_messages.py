@@ -228,7 +228,7 @@ def test_joints_whose_rate_is_not_known_have_none() -> None:
 
 
 def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
-    """The user changes the wheel radius. This alone turns no joint.
+    """The user changes the wheel radius. The change itself turns no joint.
 
     The driver divides each further distance by the new radius.
     """

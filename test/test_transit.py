@@ -248,7 +248,7 @@ def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
     """A sender sends a single command, like ``ros2 topic pub --once``. The driver accepts it.
 
-    This is also so if the sender's clock is behind.
+    The driver also accepts it if the sender's clock is behind.
     """
     receiver = Receiver()
     for number in range(20):

@@ -7,7 +7,8 @@ publish an Odometry and a JointState.
 
 ``commands PORT NAMESPACE``: write a frame for every cmd_vel.
 
-``bare PORT NAMESPACE``: only have the driver's topics and services, to show the memory of ROS.
+``bare PORT NAMESPACE``: only create the driver's topics and services. This shows how much memory
+ROS needs.
 
 The benchmark recognizes each Imu and each command by a number in it.
 """

@@ -211,7 +211,7 @@ def estop(rig: Rig) -> None:
     rig.probe.wait_for_state("nominal")
     if "start" in rig.kind.services:
         rig.probe.call(Trigger, "start")
-    rig.expect_still(since, "e-stop, with somebody driving on", 0.0)
+    rig.expect_still(since, "e-stop while commands continue", 0.0)
     rig.hand.leave()
     since = rig.line.tick
     rig.probe.call(SetBool, "estop", data=False)
@@ -225,7 +225,7 @@ def estop_by_topic(rig: Rig) -> None:
     rig.probe.wait_for(lambda: rig.estops and rig.estops[-1].data)
     since = rig.line.tick
     publisher.publish(Bool(data=False))
-    rig.expect_still(since, "e-stop by topic, with somebody driving on", 0.0)
+    rig.expect_still(since, "e-stop by topic while commands continue", 0.0)
     rig.hand.leave()
     rig.probe.call(SetBool, "estop", data=False)
     rig.probe.remove(publisher)

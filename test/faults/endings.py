@@ -86,7 +86,7 @@ class Ending:
         rig.expect_still(since, "the driver ends", self.allowed_s + more_s)
         rig.hand.leave()
         heard = bytes(rig.line.board.received)
-        rig.findings.expect(heard.endswith(rig.kind.stop), f"last it heard {heard[-26:].hex(' ')}")
+        rig.findings.expect(heard.endswith(rig.kind.stop), f"last received: {heard[-26:].hex(' ')}")
 
 
 def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:

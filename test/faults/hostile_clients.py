@@ -71,7 +71,7 @@ def flood_of_releases(rig: Rig) -> None:
         for _ in range(10):
             publisher.publish(Bool(data=False))
         rig.wait_ticks(1)
-    rig.expect_still(since, "e-stop, somebody drives on and releases by topic", 0.0)
+    rig.expect_still(since, "e-stop while commands and releases by topic continue", 0.0)
     rig.findings.expect(rig.estops[-1].data, "the e-stop was released")
     rig.hand.leave()
     rig.probe.call(SetBool, "estop", data=False)

@@ -181,7 +181,7 @@ def estop_through_a_restart(rig: Rig) -> None:
     since = rig.line.tick
     rig.reboot_board()
     rig.wait_ticks(300)
-    rig.expect_still(since, "e-stop, with somebody driving on", 0.0)
+    rig.expect_still(since, "e-stop while commands continue", 0.0)
     rig.hand.leave()
     since = rig.line.tick
     rig.probe.call(SetBool, "estop", data=False)

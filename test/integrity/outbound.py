@@ -43,7 +43,7 @@ class Bound:
     ``long_in``: N of "at most one uncommanded set-point of over 2 ms in N control frames".
 
     ``overdue``: whether it is an error if the robot still drives when it must be at rest, or at the
-    end.
+    end of the trial.
     """
 
     share: float = 1.0

@@ -27,7 +27,9 @@ _LONGEST: Final = ("stray_s", "longest_s")
 class Score:
     """Counts from trials, and times in s. Scores can be added. The module defines the terms.
 
-    ``strayed``: number of trials with stray motion. ``stray_s``: duration of the longest one.
+    ``strayed``: number of trials with stray motion.
+
+    ``stray_s``: duration of the longest stray motion.
 
     ``overdue``: number of trials in which the robot still drove when it had to be at rest.
 

@@ -14,7 +14,7 @@ from truth import SCENARIOS, generate
 
 SECONDS = 2.5
 SEED = 25
-"""In this short time, only a few seeds pause the board, so that it sends a text."""
+"""A seed with which a board is paused and sends a text. Few seeds do so in streams this short."""
 
 
 @pytest.fixture(scope="module")

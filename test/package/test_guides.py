@@ -40,7 +40,7 @@ def text_of(node: ast.AST) -> str:
 def code() -> dict[Path, list[ast.AST]]:
     """Return all syntax nodes of each module of the driver.
 
-    Garbage collection is off meanwhile. It would find nothing among the nodes, but take 1 s.
+    Garbage collection is switched off during this call. It would take 1 s and find nothing.
     """
     files = (ROOT / "omnibot_driver").rglob("*.py")
     gc.disable()

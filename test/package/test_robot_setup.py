@@ -132,7 +132,7 @@ def test_systemd_accepts_the_unit() -> None:
 def test_the_first_process_of_a_container_outlives_the_guard() -> None:
     """The driver in a container crashes. Its guard then repeats Stop for a second.
 
-    The container's first process runs for longer than that, because the guard ends with it.
+    The container's first process runs for longer than that. Its end would also end the guard.
     """
     (pause_s,) = re.findall(r"^time\.sleep\(([\d.]+)\)$", OUTLIVE.read_text(), re.MULTILINE)
     assert float(pause_s) > guard.TIMES * guard.PACE_S

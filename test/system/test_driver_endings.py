@@ -144,7 +144,10 @@ The code also makes the driver wait longer for its threads.
 def test_a_pending_service_answers_although_the_executor_learns_of_its_result_late(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver ends during a reset, while a callback runs. The answer of ``~/reset`` says so."""
+    """The driver ends during a reset, while a callback runs. ``~/reset`` answers before the end.
+
+    The answer says that the driver is shutting down.
+    """
     board = start_board(boot_time_s=1000.0, running=True)
     driver: Driver = start_driver(board.path, before=HOLDS_THE_EXECUTOR)
     probe: Probe = probe_of(driver)

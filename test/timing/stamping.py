@@ -32,7 +32,7 @@ READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""Events in the middle of a stream, and how long the host reads nothing at each of them, in s."""
+"""For each event in the middle of a stream, the time in s for which the host does not read."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
 """The generator of streams, cached. Callers share each stream, so they must not change it."""

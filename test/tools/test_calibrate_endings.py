@@ -112,7 +112,7 @@ def test_an_interruption_after_the_result_is_saved_says_where_it_is(
 ) -> None:
     """The user presses ctrl-C while ``--apply`` sets the parameters. The file is written already.
 
-    The message says so.
+    The message contains the path of the file.
     """
     assert ending("--apply") == 130
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND

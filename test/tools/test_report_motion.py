@@ -84,7 +84,8 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 ) -> None:
     """IMU or odometry messages are lost for 2 s during a turn.
 
-    The report does not compare gyro and wheels in this gap. They agree at all other times.
+    The report does not compare gyro and wheels in this gap. At all other times, gyro and wheels
+    agree.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)

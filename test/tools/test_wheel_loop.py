@@ -78,7 +78,7 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
     """Ms is the largest sensitivity of the control loop, over all frequencies.
 
-    At each frequency, the sensitivity is computed from the impulse response. It is at most Ms.
+    For any frequency, the sensitivity that is computed from the impulse response is at most Ms.
     """
     ticks = 4000
     pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks), prepend=0.0)
@@ -175,7 +175,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 def test_if_no_gains_are_within_the_limits_none_are_proposed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The limit of Ms is below 1, which no loop can reach. The tool says so."""
+    """The limit of Ms is below 1, which no loop can reach. The tool reports an error."""
     monkeypatch.setattr(tuning, "LARGEST_MS", 0.9)
     with pytest.raises(
         ToolError, match=r"no gains limit the peak of the sensitivity \(Ms\) to 0\.9"
