@@ -25,8 +25,8 @@ _CONSOLE_HELP = """\
 truth    print the true pose and the true state of the robot as one line of JSON
 reboot   power-cycle the board; the robot stays where it is
 help     print this list
-quit     end the simulator; ctrl-C, SIGTERM and a closed terminal end it too, the end of the input
-         does not"""
+quit     end the simulator; ctrl-C, SIGTERM and a closed terminal also end the simulator, but the
+         end of the input does not"""
 
 _HEALTH_CHECK_S = 0.5
 

@@ -43,7 +43,7 @@ RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four tick
 reports have arrived. The last repetition comes less than ``UNPROVED_S`` before the driver gives the
-reset up. So small counts that never change are not accepted after it."""
+reset up. So after the last repetition, small counts that never change are not accepted."""
 STEADY_S: Final = 0.3
 """Time in s. If the tick counts have not changed for this time, the wheels are regarded as at rest.
 The time is longer than the usual period of the tick reports."""
@@ -100,7 +100,10 @@ class LoisEcuBoard(Board):
 
     @property
     def reset_refusal(self) -> str:
-        """Reason why a reset is refused: in a terminal mode, no ticks show it. Otherwise empty."""
+        """Reason why a reset is refused; empty if a reset is allowed.
+
+        A reset is refused in a terminal mode, because the board then sends no ticks as a proof.
+        """
         return self._ecu.reset_refusal
 
     @property
@@ -293,10 +296,10 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and the reset command. Return nothing while ``due`` repeats them.
+        """Return Stop and the reset command. Return nothing while ``due`` repeats an earlier reset.
 
-        ``due`` repeats both until the ticks show the reset, the driver gives it up, or the robot
-        drives. In total, both are sent at most ``RESETS`` times.
+        ``due`` repeats both lines until the ticks show the reset, the driver gives up the reset, or
+        the robot drives. In total, both lines are sent at most ``RESETS`` times.
         """
         if self._reset_proof is not None and not (self._reset_shown or self._leaving):
             return NO_PACKETS

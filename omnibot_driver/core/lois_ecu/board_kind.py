@@ -17,8 +17,9 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports. If odometry with its own command byte arrives after at least this number,
-and no odometry had the command byte of ticks, the board works as in the manual."""
+"""Number of tick reports. If odometry with its own command byte (0x20) arrives after at least this
+number of tick reports, and no odometry with their command byte (0x12) has arrived, the board works
+as in the manual."""
 UNCOUNTED_M: Final = 0.06
 """Sum of both wheels' distances in m. If the wheels roll backward this far and neither count falls,
 this board does not count ticks backward."""

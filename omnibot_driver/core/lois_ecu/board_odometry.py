@@ -22,15 +22,15 @@ MOST_RPM: Final = 150.0
 class Told:
     """Changes between two consecutive odometry reports (0x20).
 
-    ``turned_m``: distance that the right rim moved farther than the left one, in m.
+    ``turned_m``: how much farther the right rim moved than the left one, in m.
 
     ``along_m``: distance that the middle of the axle moved, in m.
 
     ``still``: whether both reports have the same pose. ``same_velocity``: whether both have the
     same velocity.
 
-    ``speeds_mps``: speeds of the left and right rim in the later report, in m/s. None unless both
-    are a whole number of RPM.
+    ``speeds_mps``: speeds of the left and right rim in the later report, in m/s. None if a speed
+    is not a whole number of RPM.
     """
 
     turned_m: float

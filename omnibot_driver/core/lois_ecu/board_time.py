@@ -35,8 +35,8 @@ SAME_READ_S: Final = 0.02
 the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
 """Margin in s. A tick report is certainly irregular if it is earlier than the fitted clock by more
-than this margin. The same holds if its delay exceeds the largest recent delay by more than this
-margin."""
+than this margin. It is also irregular if its delay exceeds the largest recent delay by more than
+this margin."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -56,9 +56,9 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival time minus board time, as the change since the first tick report, in s. The first
-        value is for a clock that always runs, the second for one that stops while the board
-        sends."""
+        """Change of the arrival time minus the board's time since the first tick report, in s. The
+        first value is for a clock that always runs. The second value is for a clock that stops
+        while the board sends."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -132,7 +132,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height of each point above a straight line that touches them from below, in s."""
+    """Return how far each point is above the line of ``_line_below``, in s."""
     slope, least = _line_below(kept)
     return [behind_s - slope * at_s - least for at_s, behind_s in kept]
 

@@ -68,17 +68,18 @@ SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
 speed. It is added to the effect of ``SWINGING_M``."""
 LOST_PART: Final = (0.15, 0.35)
-"""Lost reports cause an error in a wheel's distance if its ticks are not counted. These are the
-standard deviations of the error, as a fraction of the distance that the wheel rolls meanwhile.
-First value: at a steady speed. Second value: at an oscillating one."""
+"""While reports are lost, a wheel without counted ticks gets an error in its distance. Standard
+deviation of this error, as a fraction of the distance that the wheel rolls while reports are lost.
+First value: at a steady speed. Second value: at an oscillating speed."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""A large correction by the board's odometry (0x20) has an error, because the filter is linear, but
-the motion of a starting wheel is not. ``CORRECTED_PART``: standard deviation of this error, as a
-fraction of the part of the correction that exceeds ``CORRECTED_TICKS``."""
+"""If the board's odometry (0x20) corrects a distance by more than ``CORRECTED_TICKS``, this
+correction has an error: the filter is linear, but the motion of a starting wheel is not.
+``CORRECTED_PART``: standard deviation of the error, as a fraction of the part of the correction
+beyond ``CORRECTED_TICKS``."""
 LATE_PART: Final = 0.6
-"""A late report causes an error in a wheel's distance without counted ticks. This is the standard
-deviation of the error, as a fraction of the distance that the wheel rolls in the delay."""
+"""If a report is late, a wheel without counted ticks gets an error in its distance. Standard
+deviation of this error, as a fraction of the distance that the wheel rolls during the delay."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation, in RPM, of the true difference of two wheel speeds if the board's odometry
 shows that they are equal."""
@@ -110,7 +111,7 @@ class Comparison:
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
-        Also return whether the difference is too large for an error of the filter. The difference
+        Also return whether the difference is too large to be an error of the filter. The difference
         is 0 while the board does not count. This method does not correct the filter.
 
         ``ticks``: reported ticks since the last report.
@@ -162,9 +163,9 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Restart two sums at zero: the changes of heading and of distance.
+        """Begin a new comparison with the board's odometry (0x20).
 
-        Both the sums from the board's odometry (0x20) and the expected sums are restarted.
+        The reported and the expected change of heading, and the expected distance, begin at zero.
         """
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
@@ -246,7 +247,7 @@ class Comparison:
     def _no_tick(self, duration_s: float, ticks: float) -> None:
         """Correct the filter: since the last report, no wheel rolled more than ``ticks`` ticks.
 
-        A wheel whose speed the firmware does not measure is an exception.
+        This method does not correct a wheel whose speed the firmware does not measure.
         """
         motion = self._motion
         self.begin_odometry()

@@ -301,7 +301,7 @@ class LoisConversation:
 
     @property
     def reset_refusal(self) -> str:
-        """Reason why a reset is refused: a terminal mode. Empty if it is allowed."""
+        """Reason why a reset is refused in a terminal mode. Empty if a reset is allowed."""
         change = self._upkeep.change
         return change.reason if change.terminal or change.sensor_wanted else ""
 

@@ -61,7 +61,7 @@ class LoisDecoder:
     def statistics(self) -> DecoderStatistics:
         """Counters of lines, faults and groups.
 
-        To continue the counters of an earlier decoder, assign them before the first data.
+        To continue the counters of an earlier decoder, assign them before the first ``feed``.
         """
         return self._statistics
 

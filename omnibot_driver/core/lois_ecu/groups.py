@@ -33,8 +33,8 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group is regarded as complete, if there is a report with this number
-of lines. The board sends the lines of a group 1.2 ms apart."""
+"""Silence in s after which a group is regarded as complete, if its number of lines fits a report.
+The board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
 """Longest time between two lines of a group, as a fraction of the time since the previous group

@@ -22,9 +22,9 @@ LATE_S: Final = 0.4
 their times are corrected. ``BoardTime`` handles shorter delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor by which the times between reports are increased. The rate of the clock is not known
-exactly. So if every read is late, the times could drift away from the arrival times. With this
-factor, they drift towards the arrival times."""
+"""Factor by which the computed time between two reports is increased. The rate of the board's clock
+is not known exactly. So if every read is late, the computed times could drift away from the arrival
+times. With this factor, they drift towards the arrival times."""
 
 
 @value(frozen=True, slots=True)
@@ -37,7 +37,9 @@ class Heard:
 
 
 class LateReads:
-    """Times of the reports from one board. They never decrease, and are never after the arrivals.
+    """Times of the reports from one board.
+
+    The times never decrease. The time of a report is never later than its arrival.
 
     ``ticks_per_revolution`` may be replaced at any time.
     """
@@ -46,7 +48,7 @@ class LateReads:
         self.ticks_per_revolution = ticks_per_revolution
         self._last: Heard | None = None
         self._waited = False
-        """Whether the last tick report waited. If so, the reports after it may have waited too."""
+        """Whether the last tick report was read late. Later reports may then be late too."""
         self._unit: ClockUnit | None = None
         self._arrived_s = self._latest_s = -math.inf
         self._rates: deque[float] = deque(maxlen=RATES_KEPT)
@@ -86,11 +88,11 @@ class LateReads:
         return found
 
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
-        """Return the time in s of ticks.
+        """Return the corrected time in s of a tick report.
 
-        * ``late``: whether these ticks were read late: after more than ``LATE_S`` without reports,
-          and together with later ticks.
-        * ``shown``: whether the clock shows the times between these ticks and the last ones.
+        * ``late``: whether this report was read late: after more than ``LATE_S`` without reports,
+          and together with later tick reports.
+        * ``shown``: whether the board's clock shows how much time passed since the last ticks.
         """
         last, waited, at_s = self._last, False, arrived_s
         if last is not None:

@@ -312,7 +312,7 @@ class Record:
 
     @property
     def lines(self) -> int:
-        """Number of lines that the record consists of. Each has two values, the last the end."""
+        """Number of lines of the record. Each line has two values; the last line marks the end."""
         values = len(self.left) + 1 if self.kind is RecordKind.HEADING else 2 * len(self.left)
         return values // 2 + 1
 

@@ -94,9 +94,9 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference, in m/s, between the left and the right wheel speed that the board is
-        expected to have measured since distances were last compared. While both are equal, the
-        public firmware does not change the position that it reports."""
+        """Smallest expected difference, in m/s, between the measured speeds of the two wheels since
+        distances were last compared. While both speeds are equal, the public firmware does not
+        change the position that it reports."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 

@@ -57,8 +57,9 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. Until time passes, a report may still
-        show motion from before the estimate: both were read at the same time."""
+        """Whether no time has passed since the last estimate. Until time passes, the wheels'
+        ``blind`` flags are kept: a report that was read together with the ticks of the estimate may
+        still correct the motion before the estimate."""
         self._may_roll_mps = 0.0, 0.0
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -145,8 +146,9 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether counts near zero can only come from a restart of the board.
 
-        They can if they differ from the prediction by more than the wheels can have rolled. For a
-        robot at rest, a stricter limit applies too, because larger counts may come from a push.
+        This is so if they differ from the prediction by more than the wheels can have rolled. If
+        the robot is at rest, the counts must also be very small: larger counts may come from a
+        push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """

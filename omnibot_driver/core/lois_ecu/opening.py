@@ -33,8 +33,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
-# For up to 13 ms, the board may receive nothing. Without this pause, the beginning of a motion
-# command and the end of another line could form a new motion command.
+# For up to 13 ms, the board may receive nothing. Without a pause, the beginning of a motion command
+# and the end of another line could form a new motion command.
 AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting, for example for the
 LED. It is shorter than the time between two set-points."""
@@ -100,7 +100,10 @@ class SettingsWriter:
 
     @property
     def _waits(self) -> bool:
-        """Whether settings wait while the robot drives: writing a gain resets its controller."""
+        """Whether settings must wait until the robot stops.
+
+        Writing a gain resets the wheel's controller. The first ``ROUNDS`` rounds do not wait.
+        """
         return self._points.driving and self._rounds >= ROUNDS
 
     @property
@@ -126,7 +129,7 @@ class SettingsWriter:
         self._in_period = self._answered = False
 
     def repeat(self, now: float) -> None:
-        """Write all settings again, at the latest when the robot is at rest.
+        """Write all settings again, as soon as no motion is commanded.
 
         Called if a wheel does not start, because all lines of its low-pass may have been lost.
         """
@@ -137,7 +140,7 @@ class SettingsWriter:
     def write(self, command: Command, now: float) -> None:
         """Queue a command that is not a setting, to be sent ``ROUNDS`` times.
 
-        It replaces the queued commands of the same type.
+        The new command replaces the queued commands of the same type.
         """
         self._others = deque(one for one in self._others if type(one[1]) is not type(command))
         for count in range(ROUNDS):
@@ -208,9 +211,11 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round. Each round begins with a different command.
 
-        A board that sends a report once a round could otherwise miss the same line in each round.
-        The request for a date comes last. The board answers at once, and so would miss a setting
-        that follows directly, as it does if a busy computer writes the lines of a round together.
+        Otherwise, a board that sends one report in each round could always miss the same line.
+
+        The request for a date comes last, because the board answers at once and receives nothing
+        while it sends. It would miss a setting that follows directly. A busy computer may write all
+        lines of a round together, without pauses.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order

@@ -77,7 +77,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Return whether to accept ``group``. Store it for the comparison with the next report."""
+        """Return whether to accept the report ``group``. Store it to check the next report."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):

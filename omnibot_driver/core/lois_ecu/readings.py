@@ -53,7 +53,9 @@ class RecordReading(Unstamped):
 
 @dataclass(frozen=True, slots=True)
 class RecordComes:
-    """Notification that lines of a record are arriving. The record may have been given up.
+    """Notification that lines of a record are arriving.
+
+    It is also returned if the driver has already given up the record.
 
     The board takes up to 1.3 s to send a record.
     """

@@ -42,8 +42,8 @@ class GroupStatistics:
 class RecordAssembler:
     """Assembler of the lines of a record.
 
-    Call ``add`` for each line of the record, ``drop`` for another message, and ``damage`` for
-    other characters.
+    Call ``add`` for each line of the record, ``drop`` when another message arrives, and ``damage``
+    when characters arrive that are not a line.
     """
 
     def __init__(self, statistics: GroupStatistics) -> None:
@@ -91,8 +91,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The end of a torque record looks like a sample of 0/0. So such a line counts as the end only
-        after all samples.
+        The end of a torque record looks like a sample of 0/0. So such a line is regarded as the end
+        only after all samples.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -2,8 +2,8 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-The repetitions follow quickly. Each request restarts the record, so that a late repetition would
-delay the record.
+The repetitions follow quickly. Each request restarts the record, so a late repetition would delay
+the record.
 """
 
 import math

@@ -27,17 +27,19 @@ With fewer ticks, a wheel that rolls may show no motion."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""``TOO_FAST`` (factor), ``TOO_FAST_RPM`` (in RPM): limits of a reported speed above its set-point.
-If a speed exceeds both and is repeated, the wheel is at rest and the speed is old."""
+"""Limits of a reported speed: ``TOO_FAST`` times the set-point, and ``TOO_FAST_RPM`` above the
+set-point, in RPM. If the board repeats a speed above both limits, the wheel is at rest and the
+speed is old."""
 UNLIKE: Final = 1.15
 """If both wheels roll backward, both may be too fast, but by about the same factor (speed divided
 by set-point). The two factors are assumed to differ at most by ``UNLIKE``."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
-"""Smallest number of reports without motion after which a wheel is stalled. It prevents a false
-alarm on a bad line, where few reports arrive. ``AT_LEAST_BACKWARD``: for a wheel commanded
-backward, because a wheel that rolls steadily may also show the same speed in a few reports."""
+"""Smallest number of reports without motion after which a wheel is regarded as stalled:
+``AT_LEAST`` for a wheel commanded forward, ``AT_LEAST_BACKWARD`` for a wheel commanded backward. It
+prevents a false alarm on a bad line, where few reports arrive. Backward, more reports are needed: a
+wheel that rolls steadily may also show the same speed in a few reports."""
 
 
 class StallWatch:

@@ -99,9 +99,9 @@ class ModeChange:
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
-        """Return the command to send now, because a mode is changed only after a standstill.
+        """Return the command to send now, or None. A mode is changed only after a standstill.
 
-        First, this is Stop. If the standstill cannot be seen, Stop is sent for ``UNPROVED_S``. Then
+        First, Stop is sent until the robot is seen at rest, but for at most ``UNPROVED_S``. Then
         RPM 0/0 is sent, because the public firmware would count backward duty as forward motion
         while it keeps a positive RPM target.
 

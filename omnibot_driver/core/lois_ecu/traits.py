@@ -23,7 +23,7 @@ TRAITS: Final = Traits(
     stands_after_s=STANDS_AFTER_S,
     unproved_s=2.0,
     slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
-    slack_radps=1.2,  # with the board's own gains one wheel accelerates faster
+    slack_radps=1.2,  # with the board's own gains, one wheel accelerates faster than the other
     advice={
         Fault.WRONG_WAY: "check `inverted`, and the wiring of motors and encoders",
         Fault.WRONG_TURN: "check `inverted`, and the wiring of motors and encoders",

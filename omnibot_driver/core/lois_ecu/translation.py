@@ -42,21 +42,22 @@ TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TURNS: Final = 0.3
 RESTARTED_TICKS: Final = 2
 RESTARTED_TURNS_PER_S: Final = 1.0
-"""``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration``, and ``RESTARTED_TICKS`` more: largest
-fall of a count that wheels can cause by rolling back. If a count falls further, the board has
-restarted."""
+"""Largest fall of a count that a wheel can cause by rolling back: ``RESTARTED_TURNS +
+RESTARTED_TURNS_PER_S * duration`` turns, and ``RESTARTED_TICKS`` ticks more. If a count falls
+further, the board has restarted."""
 SILENT_S: Final = 1.0
 """Time in s without tick reports. After a longer silence, counts near zero and an irregular clock
 show a restart, even if the wheels may have rolled back to these counts."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""If the unit of the board's clock has become unknown, wheels are assumed to have rolled back for
-at most this time in s since the last tick report. Without the unit, the clock cannot confirm how
-long ago that report came."""
+"""Longest time in s for which wheels are assumed to have rolled back since the last tick report, if
+the unit of the board's clock has just become unknown. Without the unit, the clock cannot confirm
+how long ago that report came."""
 IN_FLIGHT_S: Final = 0.5
-"""Time in s, after the read of the first counts that follow a reset, in which counts may still be
-from before the reset: the board sent them before it received the reset, or they were read late."""
+"""Time in s that begins when the first counts are read after a reset. In this time, counts may
+still be from before the reset: the board sent them before it received the reset, or they were read
+late."""
 
 
 class Translation:
@@ -245,12 +246,13 @@ class Translation:
         return None if wrapped_too else age_s
 
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
-        """Return whether the board has restarted, when its counts and clock may have begun at zero.
+        """Return whether the board has restarted.
 
-        A clock in ns begins at zero every 4.3 s, so a small clock value alone proves nothing. The
-        board has restarted if the clock does not fit the last reports, and rolling wheels do not
-        explain the counts. After ``SILENT_S`` without ticks, the clock alone decides. If the result
-        is False, an error is added to the odometry, because a restart is still possible.
+        Called if the counts and the clock may have begun at zero again. A clock in ns begins at
+        zero every 4.3 s, so a small clock value alone proves nothing. The board has restarted if
+        the clock does not fit the last reports, and rolling wheels do not explain the counts. After
+        ``SILENT_S`` without ticks, the clock alone decides. If the result is False, an error is
+        added to the odometry, because a restart is still possible.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)

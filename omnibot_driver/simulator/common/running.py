@@ -38,7 +38,7 @@ class RunningBoard(ABC, Generic[B]):
 
     ``board``: other threads must hold ``lock`` while they use the board.
 
-    Raises RuntimeError from ``stop``, ``check`` and ``wait_for`` if the thread has died.
+    ``stop``, ``check`` and ``wait_for`` raise RuntimeError if the thread has died.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:

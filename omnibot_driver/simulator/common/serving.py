@@ -120,7 +120,7 @@ class PtyBoard(ServedBoard[B]):
 
     @property
     def line(self) -> Line:
-        """The faulty line that the board's bytes pass through."""
+        """The line that the board's bytes pass through."""
         return self._wired.lines[0]
 
 

@@ -108,7 +108,8 @@ class Encoder:
         """Positions of both ends of the level that is at the sensor now, in periods."""
         self._per_turn = steps / 2
         self._short = short
-        # The distance between two marks has the errors of both, hence the square root of 2.
+        # The distance between two marks has the position errors of both marks. So the error of each
+        # mark is smaller by the square root of 2.
         self._off = [
             noise / 2 / 2**0.5 * random.gauss(0.0, 1.0) for _ in range(steps if noise else 1)
         ]

@@ -19,7 +19,8 @@ class Quirks:
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
     odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
         are equal.
-    velocity_may_be_nan: two ticks within one timer count divide by zero. 0x20 has NaN or infinity.
+    velocity_may_be_nan: two ticks within one timer count cause a division by zero. 0x20 then
+        contains NaN or infinity.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
     duty_drags_target: while a negative duty is commanded, each encoder tick lowers the wheel's RPM
         target by 1.
@@ -37,13 +38,13 @@ class Quirks:
     terminal_mode_zeroes_correction: each 0x11 zeroes the left wheel's correction of short levels.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
-    terminal_passes_input_on: in a terminal mode, the board first forwards its input to the sensor,
-        at 9600 or 4800 baud.
+    terminal_passes_input_on: in a terminal mode, the board forwards its input to the sensor, at
+        9600 or 4800 baud, before it reads the input itself.
     headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
     records_in_100_us: the samples of an RPM record are in 100 µs, not in 100 ns.
     torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
     record_waits_for_one_more: a record of n headings is sent when sample n + 1 arrives.
-    large_records_never_end: more than 1024 samples are never complete.
+    large_records_never_end: a record of more than 1024 samples is never complete.
     lenient_hex: a field that is not hexadecimal is accepted if the checksum is right.
     limits_rpm: targets are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.

@@ -53,7 +53,8 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    It is added to the efforts of the motors, distributed over the wheels like a velocity.
+    Both are converted to one effort for each wheel, as a velocity is converted to wheel speeds. The
+    efforts are added to those of the motors.
     """
 
     x_pwm: float = 0.0
