@@ -337,8 +337,8 @@ class LoisEcuBoard(Board):
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record. A later reading contains the record, or the reason for a failure.
 
-        Raises RequestRefused if the board could not complete the record, and while a terminal mode,
-        or a change of mode, forbids records.
+        Raises RequestRefused if the board cannot complete the record. Also raises RequestRefused
+        while a terminal mode, or a change of mode, forbids records.
         """
         self._ecu.record(kind, samples)
 

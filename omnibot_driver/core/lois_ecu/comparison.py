@@ -33,8 +33,8 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Assumed time in s from the board's reading of its counters to the arrival of the ticks' last
-line."""
+"""Assumed time in s that passes after the board reads its counters, until the last line of the tick
+report arrives."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15

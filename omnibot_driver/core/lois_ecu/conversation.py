@@ -188,8 +188,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop. None if the ticks cannot show it.
 
-        The ticks show nothing if they are old. Those of the public firmware also show nothing after
-        a backward command or RPM 0/0.
+        The ticks show nothing if they are old. The ticks of the public firmware also show nothing
+        after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -332,8 +332,8 @@ class LoisConversation:
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record.
 
-        Raises RequestRefused if the board could not complete the record, and while a terminal mode,
-        or a change of mode, forbids records.
+        Raises RequestRefused if the board cannot complete the record. Also raises RequestRefused
+        while a terminal mode, or a change of mode, forbids records.
         """
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stored states of a filter, to which it returns if a restart of the board is noticed late.
+"""History of the states of a filter.
+
+If a restart of the board is noticed late, the filter returns to an earlier state.
 
 This module works on states and times. It does not know what a state means.
 """

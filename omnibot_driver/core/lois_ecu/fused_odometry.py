@@ -24,8 +24,8 @@ class FusedOdometry:
 
     ``displacement``: motion since the previous estimate, in the robot's axes at that estimate.
 
-    ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate, at
-    the wheel radius in the settings.
+    ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate,
+    computed with the wheel radius in the settings.
     """
 
     stamp_s: float

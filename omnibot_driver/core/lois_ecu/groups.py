@@ -37,8 +37,8 @@ QUIET_S: Final = 0.05
 The board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest time between two lines of a group, as a fraction of the time since the previous group
-with the same command byte. The time since that group is measured from marker line to marker line.
+"""Longest time between two lines of a group, as a fraction of the time between the marker lines of
+this group and of the previous group with the same command byte.
 
 The longest time between two lines is at least ``QUIET_S`` and at most ``LATE_S``.
 """

@@ -48,17 +48,19 @@ LATE_PART: Final = 0.6
 speed controller's period."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
-"""``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the firmware's rounding down of a
-measured speed, in RPM."""
+"""The firmware rounds a measured speed down. ``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard
+deviation of the difference, in RPM."""
 # While a wheel rolls backward, the firmware lowers the target with each tick until the controller's
 # next step. A feed-forward may make the wheel much faster still.
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of how much faster than its
-set-point a wheel rolls backward, as a fraction of the set-point.
+"""A wheel that rolls backward is faster than its set-point.
 
-``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
+``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of this excess, as a fraction of the
+set-point.
+
+``EXCESS_CHANGE``: standard deviation that is added when the set-point changes.
 
 In each pair, the first value is for the board's own controller gains, the second for the user's.
 """

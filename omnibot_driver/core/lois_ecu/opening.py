@@ -40,8 +40,8 @@ AFTER_MOTION_S: Final = 0.015
 LED. It is shorter than the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 """Delays in s from a tick report to the next round of settings, or to a request for a date. They
-are used in turn. The board cannot receive while it sends, and with a constant delay, it might be
-sending each time."""
+are used in turn. The board cannot receive while it sends. After a constant delay, the board might
+be sending each time."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
 period."""

@@ -48,8 +48,8 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the reset is repeated, with the counts ``before`` this repetition.
 
-        The new counts replace the earlier ones if they can prove the reset. They can if they are
-        not near zero and the wheels are at rest.
+        The new counts replace the earlier counts if the new counts can prove the reset: if they are
+        not near zero, and the wheels are at rest.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

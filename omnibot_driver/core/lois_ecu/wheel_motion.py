@@ -23,8 +23,8 @@ farther the right wheel has rolled than the left one. ``ALONG``: mean distance o
 
 ``BIAS``: first of two states, the error of each wheel's speed.
 
-``EXCESS``: first of two states, how much faster than its set-point each wheel rolls backward, as a
-fraction of the set-point.
+``EXCESS``: first of two states, the excess of each wheel. A wheel that rolls backward is faster
+than its set-point by the excess, which is a fraction of the set-point.
 """
 STATES: Final = 18
 

@@ -21,7 +21,7 @@ class Channel:
 
     name: empty if the board has only one channel.
     parameter: name of the driver's parameter for this port; empty if the channel uses the UDP port
-        after that of the previous channel.
+        that follows the port of the previous channel.
     datagrams: whether the channel carries UDP datagrams; else it is serial.
     """
 

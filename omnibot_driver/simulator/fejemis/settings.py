@@ -32,7 +32,8 @@ class Firmware:
 
     ``confirms``: a command after ``!`` is confirmed.
 
-    ``shows_source``: the drive's heartbeat shows the source of the last ``rc``, not only 10 or -1.
+    ``shows_source``: the drive's heartbeat shows the source of the last ``rc``. If False, the
+    heartbeat shows only 10 or -1.
 
     ``single_precision``: times are float32, so after an hour they advance in steps of 0.2 ms.
 

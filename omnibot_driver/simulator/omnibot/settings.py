@@ -30,7 +30,8 @@ class BoardSettings:
     * ``frame``: content of the 25 Hz message. "earth": difference of positions in the board's earth
       frame. "body": sum of the ticks' displacements. "wheel_counts": encoder counts, as in the
       manual's section Deprecated.
-    * ``delta_period_s``: period of this message, a multiple of 10 ms. The manual also states 0.1 s.
+    * ``delta_period_s``: period of the same message, a multiple of 10 ms. The manual also states
+      0.1 s.
     * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: LSB per rad/s.
     * ``control``: position of the on-board switch, which decides whether commands are velocities,
       or poses in the earth frame.
