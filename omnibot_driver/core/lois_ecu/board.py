@@ -102,7 +102,7 @@ class LoisEcuBoard(Board):
     def reset_refusal(self) -> str:
         """Reason why a reset is refused; empty if a reset is allowed.
 
-        A reset is refused in a terminal mode, because the board then sends no ticks as a proof.
+        A reset is refused in a terminal mode: without ticks, the driver cannot confirm a reset.
         """
         return self._ecu.reset_refusal
 

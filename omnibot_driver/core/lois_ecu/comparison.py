@@ -33,8 +33,8 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Assumed time in s that passes after the board reads its counters, until the last line of the tick
-report arrives."""
+"""Assumed time in s from the reading of the counters by the board to the arrival of the last line
+of the tick report."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
@@ -45,11 +45,11 @@ ALONG_VARIANCE: Final = 0.15
 """
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Limit, in ticks, of the difference between a reported and an expected count. Above it, the wheel
-has changed its speed without a new set-point."""
+"""Limit, in ticks, of the difference between a reported and an expected count. Above this limit,
+the wheel has changed its speed without a new set-point."""
 UNFORESEEN: Final = 5.0
 """Limit, in standard deviations, of the difference between a reported and an expected count. Above
-it, the wheel's motion cannot be the cause: the counter may have restarted."""
+this limit, the wheel's motion cannot be the cause: the counter may have restarted."""
 SAME_TICKS: Final = 0.6
 """If a count has not changed, the filter is corrected only if the expected count differs by at
 least this number of ticks. With a smaller difference, the next tick may not be due yet."""
@@ -234,7 +234,7 @@ class Comparison:
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:
-        """Correct the filter: both wheels have the same speed, but its value is not reported."""
+        """Correct the filter: both wheels have the same speed, which the board does not report."""
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
         if sure and not any(speed.resting.chance for speed in self._speeds):

@@ -34,7 +34,9 @@ class FilterHistory:
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """Restore the last state that was stored at ``then_s`` or earlier, or else the oldest one.
+        """Restore the last state that was stored at ``then_s`` or earlier.
+
+        If all stored states are later, restore the oldest state.
 
         Return the time in s at which the restored state was stored. None if no state is stored.
         """

@@ -11,7 +11,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
 """Data from which the motion since the last estimate was computed. "standing" means that the robot
-is at rest. The heading is that of the board's odometry, not that of the compass."""
+is at rest. The heading comes from the board's odometry, not from the compass."""
 
 
 @dataclass(frozen=True, slots=True)

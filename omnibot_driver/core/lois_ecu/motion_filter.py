@@ -269,8 +269,8 @@ class MotionFilter:
     def _begin_biases(self) -> None:
         """Reset the estimated speed errors (biases) of both wheels.
 
-        In duty mode, a bias is a relative error of the speed. Otherwise, it is the amount by which
-        the firmware rounds down the measured speed, in m/s.
+        In duty mode, a bias is a relative error of the speed. Otherwise, a bias is the amount by
+        which the firmware rounds down the measured speed, in m/s.
         """
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:

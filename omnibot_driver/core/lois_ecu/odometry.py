@@ -30,10 +30,10 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
 """After the last report, the pose is predicted for this number of periods of the tick reports, or
-for ``UNHEARD_S`` s if this is longer."""
+for ``UNHEARD_S`` s if that time is longer."""
 LOST_REPORTS_S: Final = 1.2
-"""If a silence is shorter than this time in s, and no set-point changed in it, only the reports are
-assumed to be lost: the wheels have followed their set-points."""
+"""If a silence is shorter than this time in s, and no set-point changed in it, the driver assumes
+that only reports were lost, and that the wheels have followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""

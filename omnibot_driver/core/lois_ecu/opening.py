@@ -151,7 +151,7 @@ class SettingsWriter:
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ask_date(self, now: float) -> None:
-        """Request one date, unless dates come periodically or a request was sent recently."""
+        """Request one date, if dates do not come periodically and no request was sent recently."""
         if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now
@@ -196,7 +196,7 @@ class SettingsWriter:
         return outbound.lines(*found, with_sum=self.settings.with_sum)
 
     def _begin_round(self, now: float) -> None:
-        """Queue all settings, unless some settings of the previous round are not sent yet."""
+        """Queue all settings, if another round is left and the previous round has been sent."""
         if self._queue or not self._rounds_left:
             return
         self._rounds_left -= 1
@@ -214,8 +214,8 @@ class SettingsWriter:
         Otherwise, a board that sends one report in each round could always miss the same line.
 
         The request for a date comes last, because the board answers at once and receives nothing
-        while it sends. It would miss a setting that follows directly. A busy computer may write all
-        lines of a round together, without pauses.
+        while it sends. The board would miss a setting that follows directly. A busy computer may
+        write all lines of a round together, without pauses.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order
@@ -241,7 +241,10 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether the user has set a period of the date. A request for one date would end it."""
+        """Whether the user has set a period of the date.
+
+        A request for one date would end the periodic sending of dates.
+        """
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:

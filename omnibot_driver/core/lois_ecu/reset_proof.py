@@ -58,8 +58,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the result of the reset now.
 
-        The counts must be near zero. They must also prove the reset, unless ``UNPROVED_S`` has
-        passed.
+        The counts must be near zero. Until ``UNPROVED_S`` has passed, they must also prove the
+        reset.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

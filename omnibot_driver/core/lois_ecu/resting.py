@@ -15,8 +15,8 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
 """``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the last speed that the board measures before a
-wheel stops. A lower speed is that of a wheel that starts. At a higher speed, at least one more tick
-follows, unless the speed was measured wrong."""
+wheel stops. A lower speed belongs to a wheel that starts. After a higher speed, at least one more
+tick follows, if the speed was measured correctly."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -25,7 +25,7 @@ SWINGS_S: Final = 2.0
 LOST_REPORTS: Final = 4
 LOST_S: Final = 0.25
 """If the mean time between the last ``LOST_REPORTS`` reports is more than ``LOST_S``, reports were
-lost, or the board seldom sends them. Late reads hardly change the mean of four reports."""
+lost, or the board rarely sends reports. Late reads hardly change the mean of four reports."""
 REPORT_S: Final = 0.2
 """Usual longest time in s between two reports. While reports are lost, the clock of this module
 advances by at most this time with each report, so that the speeds before a gap are still known

@@ -27,9 +27,9 @@ class SetPoints:
 
     ``saturated``: number of commands that were slowed, because a value was above its limit.
 
-    ``stopped_at_s``: time of the first zero set-point after the last motion command, or infinity.
-    Each time RPM 0/0 is due, ``clears`` replaces this time by a later time. The next RPM 0/0 is due
-    ``CLEAR_AFTER_S`` after the later time.
+    ``stopped_at_s``: time of the first zero set-point after the last motion command, infinity if
+    none was sent. Each time RPM 0/0 is due, ``clears`` replaces this time by a later time. The next
+    RPM 0/0 is due ``CLEAR_AFTER_S`` after the later time.
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 

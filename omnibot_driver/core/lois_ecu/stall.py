@@ -37,9 +37,9 @@ FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
 """Smallest number of reports without motion after which a wheel is regarded as stalled:
-``AT_LEAST`` for a wheel commanded forward, ``AT_LEAST_BACKWARD`` for a wheel commanded backward. It
-prevents a false alarm on a bad line, where few reports arrive. Backward, more reports are needed: a
-wheel that rolls steadily may also show the same speed in a few reports."""
+``AT_LEAST`` for a wheel commanded forward, ``AT_LEAST_BACKWARD`` for a wheel commanded backward.
+The numbers prevent a false alarm on a bad line, where few reports arrive. Backward, more reports
+are needed: a wheel that rolls steadily may also show the same speed in a few reports."""
 
 
 class StallWatch:
@@ -127,8 +127,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        An unchanged speed of ``wheel`` is old if the other wheel's speed has changed meanwhile, or
-        if the unchanged speed is far above the set-point of ``wheel``.
+        An unchanged speed of ``wheel`` is old if the other wheel's speed has changed, or if the
+        unchanged speed is far above the set-point of ``wheel``.
         """
         if told is None or self._told is None:
             return False

@@ -24,7 +24,7 @@ UNREAD_LIMIT = 4095
 LONGEST_CATCH_UP_S = 1.0
 """Longest delay in s that the thread makes up for by running the missed ticks.
 
-After a longer delay, it skips them.
+After a longer delay, the thread skips the missed ticks.
 """
 
 _JOIN_S = 5.0
