@@ -267,14 +267,14 @@ def random_lines(seed: int, at_most_s: float) -> dict[str, Case[Rig]]:
             damaged, None, losing_bursts(5e-4, random), min(5.0, at_most_s)
         ),
         "noise instead of the board": partial(damaged, None, noise(random), min(2.0, at_most_s)),
-        "an adapter that keeps bytes back for 0.3 s": partial(
+        "an adapter that delivers bytes 0.3 s late": partial(
             damaged, None, late(30), min(3.0, at_most_s)
         ),
     }
 
 
 COMMANDS: Final[dict[str, Case[Rig]]] = {
-    "the publisher of cmd_vel ceases": publisher_ceases,
+    "the publisher of cmd_vel ends": publisher_ceases,
     "cmd_vel is NaN or infinite": publisher_sends_nonsense,
     "wheel_cmd has the wrong size": wheel_commands_of_the_wrong_size,
     "1,000 commands a second": flood_of_commands,
@@ -284,14 +284,14 @@ LINE: Final[dict[str, Case[Rig]]] = {
     "the cable is cut, from the board": cut_from_the_board,
     "the cable is cut, both ways": cut_both_ways,
     "the board reboots": board_reboots,
-    "the board reboots, somebody drives on": board_reboots_while_somebody_drives_on,
+    "the board reboots while commands continue": board_reboots_while_somebody_drives_on,
     "unplugged, plugged in under another name": unplugged,
-    "unplugged and plugged in, somebody drives on": unplugged_while_somebody_drives_on,
+    "unplugged and plugged in while commands continue": unplugged_while_somebody_drives_on,
 }
 SERVICES: Final[dict[str, Case[Rig]]] = {
     "e-stop through reboot, replug and ~/start": estop,
     "e-stop by topic; false does not release": estop_by_topic,
-    "~/pause and un-pause": partial(service_discards_the_command, "pause"),
+    "~/pause with true, then false": partial(service_discards_the_command, "pause"),
     "~/reset": partial(service_discards_the_command, "reset"),
 }
 
@@ -331,7 +331,7 @@ def second_driver(rig: Rig) -> None:
 
 
 HOST: Final[dict[str, Case[Rig]]] = {
-    "the driver hangs and goes on (SIGSTOP, SIGCONT)": driver_hangs,
+    "the driver hangs and continues (SIGSTOP, SIGCONT)": driver_hangs,
     "a second driver on the same port": second_driver,
 }
 

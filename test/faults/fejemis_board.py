@@ -109,18 +109,18 @@ def half_is(half: str, what: str, allowed_s: float) -> Any:
 
 
 CASES: Final = {
-    "the drive half falls silent, and obeys": half_is("drive", "silent", SILENCE_S),
+    "the drive half sends nothing, but obeys": half_is("drive", "silent", SILENCE_S),
     "the drive half restarts": half_restarts("drive"),
-    "the cable of the drive half is out (it drives on until it is in)": half_is(
+    "the drive half is unplugged (it drives until it is plugged in)": half_is(
         "drive", "unplugged", 0.0
     ),
-    "the drive half hangs (it drives on until it lives)": half_is("drive", "hung", 0.0),
-    "the front half falls silent, and obeys": half_is("front", "silent", ANGLE_S),
+    "the drive half hangs (it drives until it runs again)": half_is("drive", "hung", 0.0),
+    "the front half sends nothing, but obeys": half_is("front", "silent", ANGLE_S),
     "the front half restarts": half_restarts("front"),
-    "the cable of the front half is out": half_is("front", "unplugged", ANGLE_S),
+    "the front half is unplugged": half_is("front", "unplugged", ANGLE_S),
     "the front half hangs": half_is("front", "hung", ANGLE_S),
     "the angle sensor is broken (Hall element)": half_is("front", "hall-broken", ANGLE_S),
-    "the angle sensor tells an error": half_is("front", "sensor-error", ANGLE_S),
+    "the angle sensor reports an error": half_is("front", "sensor-error", ANGLE_S),
     "the angle sensor is absent": half_is("front", "sensor-absent", ANGLE_S),
 }
 
@@ -157,7 +157,8 @@ BOARD: Final = RigBoard(
             "two commanders in turn",  # the second one uses wheel_cmd
             "~/reset",
             "SIGTERM while a call is pending",  # it calls ~/reset
-            "full for long, and told once",  # at each attempt, the driver receives some data
+            # At each attempt, the driver receives some data.
+            "the kernel's buffer stays full, with one warning",
             "e-stop into a full port",  # it checks frames of the OmniBot
             "faults_of_the_network",
             "faults_of_goals",

@@ -115,10 +115,10 @@ GOALS: Final[dict[str, Callable[[GoalRig], None]]] = {
         ("the kernel's buffer is full", full_port, 0.0),
         ("the board reboots", reboot, 0.0),
         ("e-stop and release", estop, 0.0),
-        ("~/pause and un-pause", pause, 0.0),
+        ("~/pause with true, then false", pause, 0.0),
         ("~/reset", partial(service, "reset"), 0.0),
         ("~/reset_odometry", partial(service, "reset_odometry"), 0.0),
-        ("the driver hangs and goes on", hang, 0.0),
+        ("the driver hangs and continues", hang, 0.0),
     )
 }
 GOAL_ENDINGS: Final[dict[str, Callable[[GoalRig], None]]] = {

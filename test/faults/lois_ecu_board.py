@@ -45,7 +45,7 @@ BOARD: Final = RigBoard(
     jump_stddevs=4.0,
     without=frozenset(
         {
-            "~/pause and un-pause",
+            "~/pause with true, then false",
             "e-stop into a full port",  # it checks frames of the OmniBot
             "faults_of_goals",
             "goal_ending",

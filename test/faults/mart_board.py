@@ -247,10 +247,10 @@ def cases(_seed: int) -> dict[str, Case[Rig]]:
         "beyond what is assumed: the network is away for 4 s": partial(network_is_away, 4.0),
         "the server is restarted": server_is_restarted,
         "e-stop through a restart of the server": estop_through_a_restart,
-        "another client says RM": partial(another_client, b"RM 30"),
-        "another client says L": partial(another_client, b"L SLOW"),
-        "the driver hangs and goes on (SIGSTOP, SIGCONT)": HOST[
-            "the driver hangs and goes on (SIGSTOP, SIGCONT)"
+        "another client sends RM": partial(another_client, b"RM 30"),
+        "another client sends L": partial(another_client, b"L SLOW"),
+        "the driver hangs and continues (SIGSTOP, SIGCONT)": HOST[
+            "the driver hangs and continues (SIGSTOP, SIGCONT)"
         ],
         "the IMU dies while RM drives; the server is restarted": imu_dies,
     }

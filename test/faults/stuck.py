@@ -95,10 +95,10 @@ def estop_into_a_full_port(rig: Rig) -> None:
 
 TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
     "an adapter that accepts no data for 3 s": partial(stuck, 2.0),
-    "an adapter that takes and sends nothing for 3 s": partial(stuck, 2.0, mute=True),
+    "an adapter that transfers nothing for 3 s": partial(stuck, 2.0, mute=True),
     "the kernel's buffer is full": full,
-    "the kernel's buffer is full, and the board silent": partial(full, mute=True),
-    "full for long, and told once": full_for_long,
+    "the kernel's buffer is full, and the board is silent": partial(full, mute=True),
+    "the kernel's buffer stays full, with one warning": full_for_long,
     "e-stop into a full port": estop_into_a_full_port,
 }
 
@@ -170,9 +170,9 @@ def _expect_still_once_connected(rig: NetworkRig, before: int, what: str) -> Non
 
 
 NETWORK: Final[dict[str, Callable[[NetworkRig], None]]] = {
-    "socket: the server holds what goes to the board": partial(server_holds, mute=False),
-    "socket: the server holds everything": partial(server_holds, mute=True),
+    "socket: the server delays the data to the board": partial(server_holds, mute=False),
+    "socket: the server delays all data": partial(server_holds, mute=True),
     "socket: closed in one direction": server_closes_one_direction,
-    "socket: the server dies and comes back": server_dies,
-    "socket: the peer vanishes without a word": server_vanishes,
+    "socket: the server ends and is started again": server_dies,
+    "socket: the peer vanishes without closing the connection": server_vanishes,
 }

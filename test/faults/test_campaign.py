@@ -14,12 +14,12 @@ from walk import walk
 
 LEFT_OUT = {
     "an adapter that accepts no data for 3 s",
-    "the kernel's buffer is full, and the board silent",
+    "the kernel's buffer is full, and the board is silent",
     "TwistStamped where Twist is expected",
     "e-stop by topic; false does not release",
     "wheel_cmd has the wrong size",
-    "~/pause and un-pause",
-    "the driver hangs and goes on (SIGSTOP, SIGCONT)",
+    "~/pause with true, then false",
+    "the driver hangs and continues (SIGSTOP, SIGCONT)",
 }
 """Cases that this module omits, because it or test/system has a test of a similar case.
 

@@ -16,7 +16,7 @@ SOME_GOALS = (
     "a goal, and unplugged, plugged in",
     "a goal, and the kernel's buffer is full",
     "a goal, and e-stop and release",
-    "a goal, and the driver hangs and goes on",
+    "a goal, and the driver hangs and continues",
 )
 """Names of the cases that this module tests. ``make faults`` runs all cases.
 

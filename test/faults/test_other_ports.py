@@ -9,7 +9,7 @@ from omnibot_board import BOARD
 from other_rigs import NetworkRig
 from stuck import NETWORK
 
-LEFT_OUT = "socket: the server holds what goes to the board"
+LEFT_OUT = "socket: the server delays the data to the board"
 """A case that is similar to the one in which the server holds everything.
 
 ``make faults`` runs both.
