@@ -102,13 +102,14 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
     inner = bench.robot.advance
-    bench.robot.advance = (
-        lambda: [  # type: ignore[method-assign]
-            out
-            for packet in inner()
-            for out in (packet, *((packet[0], b"") for _ in packet[1:] if len(packet[1]) == 512))
-        ]
-    )
+
+    def advance() -> list[tuple[int, bytes]]:
+        out: list[tuple[int, bytes]] = []
+        for channel, data in inner():
+            out += [(channel, data)] + [(channel, b"")] * (len(data) == 512)
+        return out
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
     done = bench.job(Job.LAST_MOVE)
     assert done.success, done
     assert done.content == content
