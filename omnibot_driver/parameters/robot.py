@@ -127,7 +127,7 @@ IMU: Final = (
         "auto_gyro_bias",
         False,
         "",
-        "Refine the gyro's bias slowly while the robot stands still. Do not use it on a moving"
+        "Refine the gyro's bias slowly while the robot stands still. Leave this off on a moving"
         " base (ship, turntable).",
     ),
 )

@@ -96,8 +96,9 @@ class ReportedSpeed:
         motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
     def take(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel's estimate by a reported speed, as measured at the wheel's last tick.
+        """Correct the wheel's estimate by the speed that the board reports.
 
+        The board measured this speed at the wheel's last encoder tick.
         ``duration_s``: time since the last report, in s.
         """
         motion, estimate = self._motion, self._motion.filter

@@ -23,10 +23,11 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Standard deviations of the distance or turn of a controlled move that was not measured.
+"""Standard deviations of an unmeasured controlled move, whose distance or turn is estimated.
 
-The driver estimates this distance or turn. ``RUN``: relative error of the estimate.
-``END_RUN_M``, ``END_RUN_RAD``: additional errors of a distance in m, and of a turn in rad.
+If the network delivers the request twice, the move runs twice, and the first run is not measured.
+``RUN``: error as a part of the estimate. ``END_RUN_M``, ``END_RUN_RAD``: additional errors of a
+distance in m, and of a turn in rad.
 """
 
 

@@ -232,7 +232,7 @@ class Health:
     def tripped(self) -> str:
         """The motor board's faults that forbid driving; empty without such faults."""
         if self._encoder_fails >= ENCODER_FAILS or self.status == NO_READ:
-            return "nothing (it does not answer ENC or MCSTAT)"
+            return "nothing (the query ENC or MCSTAT fails)"
         return self.bits if (self.status or 0) & HALTING else ""
 
     @property

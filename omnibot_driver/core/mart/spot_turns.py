@@ -213,7 +213,9 @@ class SpotTurns:
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        ``unseen_s``: time from the last count to the stop. ``trip_s``: duration of a query.
+        ``unseen_s``: time in s from the last count to the first stop command.
+
+        ``trip_s``: average duration of a query, in s.
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
             return False
@@ -229,8 +231,9 @@ class SpotTurns:
     ) -> None:
         """Evaluate the angle in the reply to the stop of a turn, or None if there was no angle.
 
-        ``uncounted_s``: time in s from the last count to the stop. ``turned_s``: time in s since
-        the turn began. ``disturbed``: whether the network is disturbed, so that nothing is learned.
+        ``uncounted_s``: time in s from the last count to the first stop command. ``turned_s``: time
+        in s since the turn began. ``disturbed``: whether the network is disturbed, so that nothing
+        is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -254,9 +257,10 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from a slow turn, if the next turn shows that the robot was held.
+        """Forget what was learned from the last turn if it was slow and this turn is fast.
 
-        ``part``: the next turn's measured rate divided by its commanded rate.
+        In that case, something held the robot in the last turn. Before a slow turn is learned from,
+        keep what is known. ``part``: this turn's measured rate divided by its commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
             # otherwise the driver would learn from both turns a dead zone that does not exist

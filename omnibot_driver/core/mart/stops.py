@@ -147,9 +147,9 @@ class Stops(Ground, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the command, unless the direction of the motion is already refused.
+        the user's command, unless the driver already refuses this motion.
 
-        ``arrived``: whether the server has certainly received the start command.
+        ``arrived``: whether it is certain that the server received the start of the motion.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)

@@ -2,8 +2,8 @@
 
 """The drive Teensy: control of the driving wheels, odometry, IMU, battery, distance sensors.
 
-This module knows what the manual says about the drive Teensy, and the robot. It must not know the
-front Teensy: it learns the front wheel's angle only from a command.
+This module knows the simulated robot, and the drive Teensy as its manual describes it. It must not
+know the front Teensy: it learns the front wheel's angle only from a command.
 """
 
 from collections.abc import Callable

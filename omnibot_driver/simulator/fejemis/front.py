@@ -2,8 +2,8 @@
 
 """The front Teensy: the steered wheel and its angle sensor, brush, lift, LEDs, infrared sensors.
 
-This module knows what the manual says about the front Teensy, and the robot. It must not know the
-drive Teensy.
+This module knows the simulated robot, and the front Teensy as its manual describes it. It must not
+know the drive Teensy.
 """
 
 from collections.abc import Callable

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw each drive's path with the old and with the new geometry, and its measured end.
+    """Draw each drive's path with the old and with the new geometry, and the end measured by tape.
 
-    Also draw the errors, in standard deviations of the reading.
+    Also draw the error of each path's end, in standard deviations of the tape measurement.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]
@@ -50,7 +50,9 @@ def draw(
     right.set_yticks(rows, labels, fontsize="small")
     right.invert_yaxis()
     right.set(
-        title="Error of odom", xlabel="in standard deviations of the reading", xscale="symlog"
+        title="Error of odom",
+        xlabel="in standard deviations of the tape measurement",
+        xscale="symlog",
     )
     right.legend()
 

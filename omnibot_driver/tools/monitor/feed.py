@@ -302,5 +302,8 @@ class Feed:
         except ExternalShutdownException:
             pass
         except Exception as error:
-            self.say(f"because of a bug, this monitor receives nothing any more: {error!r}")
+            self.say(
+                f"because of a bug, this monitor receives nothing any more: {error!r}; start it"
+                " again, and please report the bug"
+            )
             raise

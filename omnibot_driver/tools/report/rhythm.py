@@ -238,7 +238,8 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         Level.WARN if uneven else Level.GOOD,
         "Timing",
         f"The steps between stamps of {stream.name} vary by {1e3 * jitter_s:.3f} ms rms.",
-        "Stamps should be sampling times: see docs/internals/time.md, and Time in /diagnostics."
+        "So some stamps are not the sampling times. The status “Time” in /diagnostics may name the"
+        " cause; docs/internals/time.md explains how stamps are made."
         if uneven
         else "",
     )

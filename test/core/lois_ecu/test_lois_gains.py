@@ -53,7 +53,7 @@ def test_gains_that_are_set_need_no_words() -> None:
 
 
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
-    """Duty commands bypass the speed controllers. The notice does not appear."""
+    """Duty commands bypass the speed controllers. No notice about missing gains appears."""
     assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []
 
 

@@ -21,7 +21,7 @@ Read = tuple[bytes, float]
 Reads = Iterator[Read]
 
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 20e-3, 0.1, 0.3)
-"""Times in s for which a reader stops.
+"""Times in s for which a reader pauses.
 
 Some are close to the idle time between two ticks, 8.8 ms, or to a tick, 10 ms.
 """
@@ -41,11 +41,11 @@ def arrivals(ticks: tuple[bytes, ...]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: tuple[bytes, ...], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """Yield the reads of a reader that stops once, for ``stop_s``, after ``place`` bytes.
+    """Yield the reads of a reader that pauses once, for ``stop_s``, after ``place`` bytes.
 
     ``most``: largest number of bytes in a read.
 
-    ``piece``: number of bytes in each read before the stop.
+    ``piece``: number of bytes in each read before the pause.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -93,9 +93,9 @@ def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """A reader reads promptly for 0.5 s. Then it stops once, in one of five frames.
+    """A reader reads promptly for 0.5 s. Then it pauses once, in one of five frames.
 
-    It stops between two bytes, at any place in a frame. No frame is lost.
+    It pauses between two bytes, at any place in a frame. No frame is lost.
     """
     ticks = ticks_of(name)[: 62 + round(stop_s / TICK_S)]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -109,7 +109,7 @@ def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: floa
 @pytest.mark.parametrize("most", [1, 8, 32])
 @pytest.mark.parametrize("piece", [1, 4])
 def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
-    """After a stop, a reader reads only a few bytes at a time until it has caught up.
+    """A reader pauses once. Then it reads only a few bytes at a time until it has caught up.
 
     No frame is lost.
     """

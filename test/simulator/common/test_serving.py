@@ -74,7 +74,11 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """The program refuses too many links, a link with the name of a file, and one to a UDP port."""
+    """A user asks for symbolic links that cannot be made. The program refuses them.
+
+    In three cases, the board has fewer serial ports than links, a file has the name of a link, and
+    the board has only a UDP port. The program leaves no other link behind.
+    """
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
         open_carriers(ToyLines.channels, three)
