@@ -24,7 +24,6 @@ class Traits:
     * ``own_odometry``: whether OdometryReadings give the pose. If not, the driver integrates
       displacements.
     * ``stands_after_s``: time without motion, in s, that proves a standstill.
-    * ``unproved_s``: longest time, in s, for which Stop is repeated without this proof.
     * ``baudrate``: whether the line has a baud rate.
     * ``calibrates_gyro``: whether the board itself subtracts the gyro's bias. If so, its profile
       offers ``~/calibrate_gyro``.
@@ -44,7 +43,6 @@ class Traits:
     silence_s: float
     own_odometry: bool = False
     stands_after_s: float = 0.1
-    unproved_s: float = 5.0
     baudrate: bool = True
     calibrates_gyro: bool = False
     stops_within_s: float = 0.0

@@ -192,6 +192,22 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 
 
 @pytest.mark.slow
+def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_again(
+    bench: AnyBench,
+) -> None:
+    """Both directions of the line to a driving robot are cut. After 4 s, the robot receives again.
+
+    It still sends nothing. The driver repeats Stop for 5 s without a proof, so the robot stops.
+    """
+    bench.drive_on()
+    bench.speaks = bench.hears = False
+    bench.run(4.0)
+    bench.hears = True
+    bench.run(2.0)
+    assert bench.robot.stands
+
+
+@pytest.mark.slow
 def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
     """A command with NaN is refused, and the command before it stays active."""
     bench.drive_on()

@@ -57,9 +57,7 @@ class CommandPipeline:
     ) -> None:
         proof = StopProof(board.traits.stands_after_s)
         self._actuator = board.actuator(proof)
-        self.policy = CommandPolicy(
-            settings.commands, self._actuator, proof, board.traits.unproved_s
-        )
+        self.policy = CommandPolicy(settings.commands, self._actuator, proof)
         self._odometry = odometry
         self.shaper = CommandShaper(
             board,

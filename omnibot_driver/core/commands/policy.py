@@ -43,15 +43,8 @@ class CommandPolicy:
     * ``proof``: the proof that the robot stands still.
     """
 
-    def __init__(
-        self,
-        settings: CommandSettings,
-        actuator: Actuator,
-        proof: StopProof,
-        unproved_s: float = UNPROVED_S,
-    ) -> None:
+    def __init__(self, settings: CommandSettings, actuator: Actuator, proof: StopProof) -> None:
         self.proof = proof
-        self._unproved_s = unproved_s
         self._actuator = actuator
         self.configure(settings)
         self.latched = False
@@ -100,7 +93,7 @@ class CommandPolicy:
         """Drop the current command, and repeat Stop until a standstill is proved.
 
         Stop is repeated for at least ``STOPPING_S``. Without proof, the repetition ends after
-        ``unproved_s``. With a latched e-stop, the emergency stop is repeated until ``release``.
+        ``UNPROVED_S``. With a latched e-stop, the emergency stop is repeated until ``release``.
         """
         self.current = None
         self.quiet = False
@@ -149,4 +142,4 @@ class CommandPolicy:
 
     @property
     def _stopping_s(self) -> float:
-        return STOPPING_S if self.proof.proved else self._unproved_s
+        return STOPPING_S if self.proof.proved else UNPROVED_S

@@ -21,7 +21,6 @@ TRAITS: Final = Traits(
     silence_s=1.5,
     own_odometry=True,
     stands_after_s=STANDS_AFTER_S,
-    unproved_s=2.0,
     slack_mps=0.15,  # a tick in 0.2 s is 0.07 m/s
     slack_radps=1.2,  # with the board's own gains, one wheel accelerates faster than the other
     advice={

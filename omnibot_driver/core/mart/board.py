@@ -36,7 +36,6 @@ TRAITS: Final = Traits(
     silence_s=1.5,
     own_odometry=True,
     stands_after_s=0.3,
-    unproved_s=6.0,
     baudrate=False,
     stops_within_s=1.0,
     slack_mps=0.15,
