@@ -84,9 +84,10 @@ class Ending:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the driver until it must end; return 0, 1 after a defect, or 2 if it cannot start.
+    """Run the driver until it must end, and return the exit code.
 
-    The main thread must only wait: a second signal must not interrupt the shutdown.
+    The exit code is 0 after a normal end, 1 after a defect, and 2 if the driver cannot start. The
+    main thread must only wait, so that a second signal does not interrupt the shutdown.
     """
     args = sys.argv if args is None else args
     fill_gaps()

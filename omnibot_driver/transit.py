@@ -65,8 +65,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: possible times of sending by our clock. There are two until the offset of the
-      sender's clock is known, and then only one.
+    * ``sent_ns``: possible times of sending by our clock. While the offset of the sender's clock is
+      unknown, there are two possible times. Otherwise there is one.
     """
 
     total_s: float
@@ -138,7 +138,10 @@ class Transit:
 
 
 class _Sender:
-    """One sender on a topic, with the offsets of both of our clocks from its clock."""
+    """One sender on a topic.
+
+    It has two offsets from the sender's clock: of our time of day, and of our steady clock.
+    """
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
         self.number: int | None = None
@@ -179,14 +182,19 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return how far the difference is above the offset plus drift, in s; negative if below.
+        """Return how late a message is at least, in s: ``difference_s`` minus offset and drift.
 
-        ``difference_s``: arrival by our clock minus sending by the sender's clock.
+        The result is negative if the difference is smaller than the sum of the offset and the
+        largest possible drift. ``difference_s``: arrival by our clock minus sending by the sender's
+        clock.
         """
         return difference_s - self._least_s - self._drift_s(at_s)
 
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest possible misfit, as ``_Sender.misfit_s`` does."""
+        """Return the smallest and the largest possible misfit of a message, by this offset alone.
+
+        ``_Sender.misfit_s`` explains the misfit.
+        """
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS
         return weight * max(0.0, abs(excess_s) - drift_s), weight * (abs(excess_s) + drift_s)

@@ -215,10 +215,11 @@ class Session:
         self._command(self._commanding.pose(goal), now)
 
     def end_goal(self, now: float) -> None:
-        """End a drive to a goal: a zero ``cmd_vel`` was refused, e.g. because it was too old.
+        """End a drive to a goal, because a zero ``cmd_vel`` was refused, e.g. as too old.
 
-        This has no effect on a velocity: a velocity expires by itself, and may be newer than the
-        zero ``cmd_vel``.
+        A goal has no timeout, so even a refused zero command must end it. If the robot follows a
+        velocity and not a goal, this call has no effect: the velocity expires by itself, and may be
+        newer than the zero ``cmd_vel``.
         """
         self._reporter.notify(self._commanding.end_goal(now))
 
@@ -266,8 +267,8 @@ class Session:
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who latches or releases, as named in the notice. Raises RequestRefused for a release
-        while the robot's button is held.
+        ``by``: who latches or releases the e-stop; the notice contains this name. Raises
+        RequestRefused for a release while the robot's button is held.
         """
         return self._safety.estop(active, now, by=by)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Processor time and wake-ups of each thread of the driver, as counted by the kernel."""
+"""Processor time and wake-ups of each thread of the driver, from the kernel's counters."""
 
 import time
 from contextlib import suppress

@@ -57,9 +57,10 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty, so the campaign does not require that the driver's last bytes are a stop.
+        """The bytes that the board has received, for the campaign: here, always empty.
 
-        After its last stop, a driver of a MART still sends queries.
+        If they were not empty, the campaign would require that the driver's last bytes are a stop.
+        After its last stop, the driver of a MART still sends queries.
         """
         return b""
 

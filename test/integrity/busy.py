@@ -118,7 +118,7 @@ def all_at_once(pieces: Chunker) -> Chunker:
 
 
 def in_parts(received: Received, random: Random) -> Chunks:
-    """Deliver single bytes. A late reader reads 1 to 8 of the bytes that have arrived."""
+    """Deliver single bytes to a late reader. A read takes 1 to 8 of the bytes that have arrived."""
     pieces = CHUNKERS["single bytes"](received, random)
     return read(pieces, random, lambda: random.randint(1, 8))
 

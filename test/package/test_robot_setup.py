@@ -96,8 +96,8 @@ def unit_settings() -> dict[str, list[str]]:
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
     """The systemd unit starts the driver without a shell in between.
 
-    Signals therefore reach the driver itself. The port is that of the parameter file, because each
-    board has other ports.
+    Signals therefore reach the driver itself. The command gives a parameter file, but no port: the
+    port is in the parameter file, because each board has other ports.
     """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
@@ -130,9 +130,10 @@ def test_systemd_accepts_the_unit() -> None:
 
 
 def test_the_first_process_of_a_container_outlives_the_guard() -> None:
-    """The driver in a container crashes. Its guard then repeats Stop for a second.
+    """The driver in a container crashes. The driver's guard then repeats Stop for a second.
 
-    The container's first process runs for longer than that. Its end would also end the guard.
+    The container's first process waits for more than a second before it ends. If it ended earlier,
+    the kernel would also end the guard.
     """
     (pause_s,) = re.findall(r"^time\.sleep\(([\d.]+)\)$", OUTLIVE.read_text(), re.MULTILINE)
     assert float(pause_s) > guard.TIMES * guard.PACE_S
@@ -144,9 +145,9 @@ DRIVER = "trap 'exit 7' TERM; echo ready; {}; while :; do sleep 0.1; done"
 
 @pytest.mark.parametrize("stop", ["kill -TERM $PPID", "kill -INT $PPID"])
 def test_the_first_process_of_a_container_passes_a_stop_on(stop: str) -> None:
-    """``docker stop`` sends SIGTERM to the first process, and the driver receives it.
+    """``docker stop`` sends SIGTERM to the first process, which passes it on to the driver.
 
-    The exit code is that of the driver.
+    The exit code of the first process is the exit code of the driver.
     """
     command = [sys.executable, OUTLIVE, "bash", "-c", DRIVER.format(stop)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
@@ -155,9 +156,10 @@ def test_the_first_process_of_a_container_passes_a_stop_on(stop: str) -> None:
 
 @pytest.mark.slow
 def test_a_stop_at_any_moment_of_the_start_ends_the_container() -> None:
-    """The first process receives SIGTERM while it starts the driver. Both end.
+    """The first process of a container receives SIGTERM while it starts the driver.
 
-    The first process ends before the driver runs, or passes SIGTERM on to it.
+    Neither process stays behind: the first process ends before the driver runs, or it passes
+    SIGTERM on to the driver.
     """
     command = [sys.executable, OUTLIVE, "bash", "-c", DRIVER.format("true")]
     containers = []

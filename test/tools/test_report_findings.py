@@ -129,7 +129,7 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
     """The messages of a topic end early. The report shows a gap up to the end of the log.
 
-    It shows none if the driver's state explains the end.
+    If the driver's state explains the early end, for example by a pause, the report shows no gap.
     """
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
@@ -205,9 +205,10 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
 
 @pytest.mark.parametrize("ahead_s", [3.0, -3.0])
 def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: float) -> None:
-    """The recorder's clock is 3 s ahead of the robot's, or behind it. Only the clock is reported.
+    """The recorder's clock is 3 s ahead of the robot's clock, or 3 s behind it.
 
-    The robot drives as commanded. After the drive, the e-stop is latched.
+    The robot drives as commanded, and after the drive, the e-stop is latched. The report names only
+    the clock. It does not say that the robot moved without a command, or against one.
     """
     drive = Drive(estops=[(0.0, False), (16.5 + ahead_s, True)])
     for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):

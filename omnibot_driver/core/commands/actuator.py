@@ -28,7 +28,7 @@ class Actuator(Protocol):
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """Body velocity of the last command sent, as rounded by the encoding, in the board's axes.
+        """Body velocity of the last command sent, after its rounding, in the board's axes.
 
         None if the command, such as a goal, does not determine the velocity.
         """

@@ -18,8 +18,8 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Speed in m/s below which 0 is written as the speed for the front board, because few smaller
-numbers can be sent safely."""
+"""Smallest commanded speed in a curve, in m/s, that is written to the front board. In place of a
+smaller speed, 0 is written, because only few smaller numbers can be sent safely."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""
@@ -27,8 +27,11 @@ ANGLE_COST: Final = 1e4
 """Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle. For
 comparison: a speed that is wrong by a factor of 2.7 (e) costs 1."""
 SLOWEST: Final = 30.0
-"""The linear speed in the drive board's line is at least the outer wheel's speed divided by this
-number, or it is 0. It is never 0 for backward motion, because its sign gives the direction."""
+"""Largest ratio of the outer wheel's speed to the linear speed in the drive board's line.
+
+For forward motion, the linear speed can also be 0. For backward motion it cannot, because its sign
+gives the direction.
+"""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """

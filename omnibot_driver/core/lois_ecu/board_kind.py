@@ -17,12 +17,14 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports. If odometry with its own command byte (0x20) arrives after at least this
-number of tick reports, and no odometry with their command byte (0x12) has arrived, the board works
-as in the manual."""
+"""Least number of tick reports before the kind of the board is decided.
+
+If no odometry with the command byte of ticks (0x12) has arrived by then, and odometry with its own
+command byte (0x20) arrives, the board works as in the manual.
+"""
 UNCOUNTED_M: Final = 0.06
-"""Sum of both wheels' distances in m. If the wheels roll backward this far and neither count falls,
-this board does not count ticks backward."""
+"""Distance in m, summed over both wheels, that the wheels must roll backward before the board is
+judged. If neither count has fallen by then, the board does not count ticks backward."""
 
 
 class BoardKind:
@@ -62,7 +64,8 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        This is so if its odometry shows a wheel that rolls backward while no count decreases.
+        This is so if a wheel is commanded backward, and the board's odometry shows that the wheel
+        rolls backward, but no count decreases.
 
         ``told``: changes in the board's odometry since its last report, None if unknown.
         """

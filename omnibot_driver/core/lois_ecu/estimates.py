@@ -90,9 +90,9 @@ class Estimates:
     ) -> FusedOdometry:
         """Return the estimate at ``stamp_s``. This call has no effect on the next estimate.
 
-        ``unheard_s``: time since the filter's state, in s.
+        ``unheard_s``: how much later than the filter's state ``stamp_s`` is, in s.
 
-        ``may_roll_mps``: greatest possible speed of each wheel in this time, in m/s.
+        ``may_roll_mps``: greatest possible speed of each wheel during ``unheard_s``, in m/s.
         """
         motion = self._motion
         mean = motion.filter.mean

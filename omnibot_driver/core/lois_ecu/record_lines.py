@@ -70,7 +70,7 @@ class RecordAssembler:
         self._damaged = self.begun
 
     def add(self, code: int, payload: int) -> list[Record | LostRecord]:
-        """Add a line. Return a list with the record that the line ends, or an empty list."""
+        """Add a line. Return an empty list, or a list with the record if this is its last line."""
         if not self.begun:
             self._begin(code)
         self._lines += 1

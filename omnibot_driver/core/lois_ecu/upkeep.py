@@ -89,7 +89,11 @@ class Upkeep:
         )
 
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
-        """Return a zero set-point, or the line that sets the terminal mode, if one is due."""
+        """Return the bytes that change the terminal mode, or no bytes if nothing is due.
+
+        First, these are zero set-points, because the robot must be at rest. Then they are the lines
+        that set the mode.
+        """
         change, with_sum = self.change, self.writer.settings.with_sum
         if stop := change.stops(now, stands=stands, cleared=self._points.cleared):
             return outbound.lines(stop, with_sum=with_sum)

@@ -13,9 +13,10 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""A move is regarded as incomplete if its measured distance or turn is below this fraction.
+"""Smallest measured distance or turn of a complete move, as a fraction.
 
-It is a fraction of the requested or of the expected distance or turn, whichever is smaller.
+It is a fraction of the smaller one of two values: the requested distance or turn, and the expected
+distance or turn.
 """
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
@@ -34,8 +35,8 @@ class Done:
 
     A duplicate of the request may have started a second run of the same move.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder; of the second run only, if there
-    was one.
+    ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, they are
+    the distance and turn of the second run alone.
 
     ``lasted_s``: time in s from the request to the reply.
 
@@ -43,7 +44,7 @@ class Done:
 
     ``completed``: whether the move ended by itself with a success, without a stop.
 
-    ``expected``: distance in m, or turn in rad, of a complete run, as learned from earlier moves.
+    ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
 
     ``stopped_again``: whether the driver has sent a stop after the move, to end a possible second
     run.
@@ -107,9 +108,10 @@ class Done:
 
     @property
     def contradicts_the_server(self) -> bool:
-        """Whether the right wheel has turned much less or much more than a completed turn requires.
+        """Whether the encoder contradicts the server, which has reported a completed turn.
 
-        The server ends a turn by the gyro, so one of the wheels may be stuck or slip.
+        The right wheel has then turned much less or much more than the turn requires. The server
+        ends a turn by the gyro alone, so it does not notice a wheel that is stuck or slips.
         """
         if self.is_straight or not self.completed or not self.is_large:
             return False
@@ -125,7 +127,7 @@ class Done:
 
     @property
     def has_run_twice(self) -> bool:
-        """Whether a first run was complete, and the driver has then stopped a second run."""
+        """Whether the first run was complete, and the driver has stopped a second run."""
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
 
@@ -140,9 +142,9 @@ class Done:
 
     @property
     def ended_early(self) -> bool:
-        """Whether the reply came before the end of a complete run, so it answers another request.
+        """Whether the reply came so early that the move cannot have been complete.
 
-        The driver may then have sent a stop to end a possible second run. In this case, the stop
-        has ended the first run.
+        The reply then belongs to another request. If the driver then sent a stop to end a possible
+        second run, this stop has ended the first run.
         """
         return self.lasted_s < FULL * self.usual_s

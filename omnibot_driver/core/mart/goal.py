@@ -21,7 +21,7 @@ SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
 """Motor units of controlled moves at normal speed, which are sent without the word SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After ENOUGH_MOVES moves, the robot need only be within ENOUGH_M (m) of the goal.
+"""Number of moves after which a larger distance from the goal is accepted, and this distance in m.
 
 To come nearer, the robot would have to make another turn and another straight move.
 """
@@ -149,9 +149,9 @@ class Move:
         return Move(self.place, said=ENOUGH_MOVES, turns=self.turns)
 
     def cut(self) -> None:
-        """Begin to count anew, because the driver has stopped a straight move that took too long.
+        """Count moves and turns from 0 again. A straight move took too long and was stopped.
 
-        The server needs more than one move for a goal far away.
+        This is not a failure: the server needs more than one straight move to a goal far away.
         """
         self.said = self.turns = 0
 

@@ -19,10 +19,10 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that may remain unanswered in a backward drive (B).
+"""Largest relative change of the motors' units after which the driver may continue without a reply.
 
-The limit applies while the server does not report the heading. After a larger change without a
-reply, the turn of the robot is not known, so the driver stops the robot.
+The limit applies to a backward drive (B) whose headings the server does not report. If the server
+does not answer a larger change, the turn of the robot is not known, so the driver stops the robot.
 """
 
 

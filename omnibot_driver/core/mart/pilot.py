@@ -240,10 +240,11 @@ class Pilot(Hearing):
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time at which to stop a suspected duplicate of a controlled move, or infinity.
+        """The time at which to stop a suspected duplicate of a controlled move.
 
-        The stop commands are SL and SS. After a forward or backward drive, they would hang the
-        server.
+        It is infinity if no duplicate is suspected, and in any state other than STILL. The stop
+        commands are SL and SS. They must not be sent after a forward or backward drive, because
+        they would then hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf

@@ -16,10 +16,11 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Longest time in s that a robot needs to follow a set-point. So a displacement is compared with
-all set-points that were in effect while it was measured, or at most this time earlier.
+"""Longest time in s that a robot needs to follow a set-point.
 
-A robot that is clearly slower than all these set-points is assumed to be held.
+So a displacement is compared with the set-points that were in effect while it was measured, and
+with those of the last RISING_S before the measurement began. A robot that is clearly slower than
+all these set-points is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
@@ -69,7 +70,7 @@ class FollowingError:
         *,
         heading_known: bool,
     ) -> None:
-        """Add one displacement to the error. If it is inside the envelope, reset the error.
+        """Add one displacement to the error. A displacement inside the envelope resets the error.
 
         ``motion``: mean twist during ``seconds`` from the time ``begun_s`` on.
 

@@ -134,8 +134,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""If no delta has arrived since the stream began or was damaged, a delta is expected only until
-this number of deltas is missing."""
+"""Number of missing deltas after which no delta is expected any more. It applies until the first
+delta arrives: at the beginning of a stream, and after damage."""
 
 
 class Context(NamedTuple):
@@ -283,8 +283,9 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    The byte must occur in headers. If it is not FF and ends an IMU frame, the last word must also
-    differ from that of the previous IMU frame.
+    This is possible only if the byte occurs in headers. For an IMU frame there is a second
+    condition: the byte is FF, or the frame's last word differs from the last word of the previous
+    IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -16,7 +16,8 @@ from omnibot_driver.simulator.common.network import FaultyNetwork
 B = TypeVar("B", bound=SimulatedBoard)
 
 Line = FaultyLine | FaultyNetwork
-"""The line of a serial channel, or of a datagram channel."""
+"""A simulated line: ``FaultyLine`` carries serial bytes, and ``FaultyNetwork`` carries datagrams.
+"""
 
 
 def good_line(channel: Channel) -> Line:

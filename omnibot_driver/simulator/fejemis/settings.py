@@ -22,8 +22,8 @@ class Firmware:
     ``sums``: lines carry the checksum ``;NN`` and are checked. If False, lines have none, as in the
     manual.
 
-    ``reverse``: angle of the front wheel for driving backward. ``mirrored``: the same angle as for
-    driving forward on the same curve. ``clamped``: an angle beyond ±90° stays at ±90°.
+    ``reverse``: angle of the front wheel for driving backward. The value "mirrored" means: the same
+    angle as for driving forward on the same curve. The value "clamped" means: at most ±90°.
 
     ``tilt``: ``pose`` has a fifth number, the tilt.
 

@@ -156,7 +156,7 @@ class MartServer(ServerState):
         self._wake()
 
     def watch(self, kind: Kind) -> None:
-        """Supervise this kind of motion, unless another kind is supervised already."""
+        """Supervise motions of ``kind``. No effect if another kind is supervised already."""
         if self.alarm is None:
             self.alarm = kind
         self._wake()
@@ -166,9 +166,9 @@ class MartServer(ServerState):
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` at the next notice that a motion of this kind has started or ended.
+        """Call ``then`` when ``post`` announces that a motion of ``kind`` has started or ended.
 
-        If the motion already has a notice, call ``then`` now.
+        If ``post`` has kept an earlier notice of this kind, call ``then`` now.
         """
         motion = self.motions[kind]
         if motion.posts:
@@ -179,9 +179,9 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give a notice to the first port that waits for a motion of this kind to start or end.
+        """Tell the first port that waits for it that a motion of ``kind`` has started or ended.
 
-        If no port waits for such a motion, keep the notice.
+        If no port waits for a motion of this kind, keep the notice for the next ``wait``.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -188,7 +188,9 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first is for the current geometry. The second is for ``found``, but with three equal wheels.
+    The first error is with the driver's current geometry. The second error is with the geometry
+    ``found``, but with its mean radius for all three wheels, because the driver has no parameters
+    for single wheels.
     """
     before: list[float] = []
     after: list[float] = []

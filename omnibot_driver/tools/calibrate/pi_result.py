@@ -62,7 +62,7 @@ class Measured:
 class WheelTuned:
     """The result of the tuning of one wheel.
 
-    ``fit``: the plant as fitted to the starts at full duty.
+    ``fit``: the plant that was fitted to the starts at full duty.
 
     ``plant``: the plant for which the gains were tuned.
 

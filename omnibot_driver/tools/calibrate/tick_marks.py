@@ -24,9 +24,9 @@ LARGEST: Final = 0.5
 A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""A time is not used if its relative error is larger than this number of standard deviations.
+"""Largest relative error of a time between ticks that is used, in standard deviations.
 
-The standard deviation is that of all errors, estimated from their median.
+The standard deviation is estimated from the median size of all errors.
 """
 EXPLAINED: Final = 0.4
 """Fitted marks are accepted only if they explain at least this fraction of the variance.
@@ -53,9 +53,9 @@ class Marks:
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the number of the mark at which a record begins. Marks are numbered from 0.
+        """Return the number of the mark on the encoder's disc at which a record begins.
 
-        ``off``: relative errors of the record's times between ticks.
+        Marks are numbered from 0. ``off``: relative errors of the record's times between ticks.
         """
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 

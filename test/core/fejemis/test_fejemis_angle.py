@@ -98,9 +98,10 @@ def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
 
 
 def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
-    """The driver reads late, and the front board is silent from then on.
+    """The front board falls silent, and at first the driver reads late.
 
-    60 ms later the refusal names the front board.
+    While the driver reads late, the refusal of a command names the computer. When the driver reads
+    in time again, the refusal names the front board.
     """
     bench = nominal()
     bench.run(0.1)
@@ -114,7 +115,10 @@ def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
 
 
 def test_a_late_read_is_not_blamed_on_the_drive_board() -> None:
-    """The driver reads nothing for 0.3 s. The refusal names neither board."""
+    """The driver reads nothing for 0.3 s.
+
+    The refusal of a command names the computer, and neither board.
+    """
     bench = nominal()
     bench.run(0.3)
     bench.read_s = 0.4

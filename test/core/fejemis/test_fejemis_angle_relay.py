@@ -34,8 +34,8 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 def test_every_angle_is_told_within_half_a_degree() -> None:
     """Every relayed angle is right within 0.5°.
 
-    Usually, an angle is rounded to 0.1°. If the checksum could miss damage of this text, the driver
-    looks for a better text of an angle that is at most 0.5° away.
+    Usually, the driver rounds an angle to 0.1° and writes it as text. If the line's checksum would
+    miss some damage of this text, the driver writes a safer angle that is at most 0.5° away.
     """
     told = [float(relayed(angle_deg)[4:]) for angle_deg in EVERY]
     assert max(map(abs, told)) == 90.0
@@ -128,8 +128,8 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 ) -> None:
     """The board reads no angle beyond 90°, although rounding errors are added to later angles.
 
-    This is also true for damaged lines: a line with a checksum loses two characters although the
-    checksum still fits, and a line without a checksum loses one character.
+    This is also true in two cases of damage: two characters of a line are lost and the checksum
+    does not detect it, or one character of a line without a checksum is lost.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

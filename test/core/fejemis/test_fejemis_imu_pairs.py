@@ -179,9 +179,9 @@ def outcome(reads: list[Read]) -> Outcome:
 
 
 def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
-    """Return whether the stream shows that a false pair is false.
+    """Return whether a program that sees only the stream can recognize this false pair.
 
-    ``pair``: the numbers of the two samples that its lines belong to.
+    ``pair``: the sample numbers of its two lines. The pair is false, so the numbers differ.
     """
     wanted = {("gyro", pair[0]), ("acc", pair[1])}
     found = [(now, line) for now, lines in reads for line in lines]
@@ -277,8 +277,8 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
 
-    There is one exception: if the lines are late and no pose follows in the same read, nothing in
-    the stream shows that the two lines are of different samples.
+    There is one exception. If both lines of a false pair are late, and no pose follows in the same
+    read, nothing in the stream shows that the lines belong to different samples.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

@@ -328,11 +328,12 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """The decoder counts the lines in another form, and begins a new count after every 24 lines.
+    """The decoder discards lines that do not have the learnt form, and counts them.
 
-    At 8 lines in another form, it no longer checks the form. Here, 7 such lines are at the end of
-    one window of 24 lines, and 7 at the beginning of the next. All 14 are discarded. One more in
-    the second window is accepted. ``windows``: number of earlier windows without such lines.
+    It begins a new count after every 24 lines (a window). When a count reaches 8, the decoder no
+    longer checks the form of this kind of line. Here, one window ends with 7 wrong lines, and the
+    next window begins with 7 wrong lines. All 14 are discarded. The 8th wrong line of the second
+    window is accepted. ``windows``: number of earlier windows without wrong lines.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

@@ -53,10 +53,11 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
     ],
 )
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
-    """The robot drives a curve while the driver stalls, or reads late. Nothing is lost.
+    """The robot drives a curve while the driver stalls. The odometry has all of this motion.
 
-    If the driver does not notice the stall, it rejects lines that are more than 1 s late. The first
-    displacement then covers seconds, and the next one 20 ms. Neither is regarded as implausible.
+    No line is lost. If the driver does not notice the stall, it rejects lines that are more than
+    1 s late. Then the first displacement covers seconds, and the next one covers 20 ms. The driver
+    regards neither displacement as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -92,10 +93,11 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
-    """After a stall, the driver is busy with the first read, so the second one is late as well.
+    """After a stall, the driver is busy with the first read, so the second read is late as well.
 
-    Bytes are lost between the reads. The first sample after them is left out, because no earlier
-    pose shows its time. All others get the times at which the board took them.
+    Bytes are lost between the two reads. The driver leaves out the first sample after the lost
+    bytes, because no earlier pose shows its time. All other samples get the times at which the
+    board took them.
     """
     bench = nominal()
     bench.run(1.0)

@@ -24,8 +24,9 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    If the IMU is dead or the driver has given up, only a crash is wrong. While the driver finds out
-    which motion is in progress, only a crash or a hanging command port is wrong.
+    A crash of the server is always wrong. Nothing else is wrong if the IMU is dead, or if the
+    driver has given up. While the driver finds out which motion is in progress, a hanging command
+    port is wrong too, but nothing else.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -91,7 +92,7 @@ FOUND_MOVING: Final = (
 
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Search the reachable worlds, breadth first; stop at the first one that must not occur."""
+    """Search the reachable worlds, breadth first. Stop at the first world that must not occur."""
 
     @cache
     def allowed(state: State, motion: Motion) -> tuple[str, ...]:

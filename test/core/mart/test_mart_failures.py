@@ -86,10 +86,10 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The server rejects one forward drive (RM) and obeys the next. The driver stops this drive.
+    """The server rejects one forward drive (RM) and obeys the next one. The driver ends that drive.
 
-    Then the robot moves without a command. The driver does not regard the server as defective, so
-    motion stays allowed.
+    Later, the robot moves without a command. A motion after a rejected RM can show a defective
+    server. But an RM was obeyed in between, so the driver still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -211,9 +211,10 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
-    """One or both motors are stuck, so the driver switches both off.
+    """One or both motors are stuck, so the driver switches both motors off.
 
-    Until then the left wheel may turn the robot. The covariance covers this turn.
+    Before that, the left wheel may turn the robot while the right wheel is stuck. The covariance of
+    the odometry covers this turn.
     """
     bench = MartBench(firmware).ready()
     if driving:

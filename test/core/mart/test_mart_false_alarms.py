@@ -23,9 +23,11 @@ Its wheels still turn when the server no longer waits for the end of a stop.
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
-    """One heading cannot show that the heading is constant. A drive's first heading comes late.
+    """One heading cannot show that the heading is constant.
 
-    So the time without a change of the heading begins with this first heading.
+    Therefore, the driver measures the time without a change of the heading from the first heading
+    of a drive, and not from the start of the drive. Here, the first heading comes 0.7 s after the
+    start.
     """
     heading = RelativeHeading()
     heading.begin(10.0, anew=True)
@@ -99,10 +101,10 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 @pytest.mark.slow
 @pytest.mark.parametrize("stuck", ["right", "both"])
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
-    """A motor is stuck, so the turn of a goal does not begin. The driver discards the goal.
+    """A motor is stuck, so the turn towards a goal does not begin. The driver discards the goal.
 
-    For a turn of a heavy robot, the server reports the same failure, but the driver then continues
-    to the goal.
+    The server reports the failure "start timedout". It reports the same failure if a heavy robot
+    still moves some time after a turn. In that case, the driver continues to the goal.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -115,8 +117,9 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
     """An obstacle ends a move of a heavy robot early. The server reports only a slow stop.
 
-    The driver learns nothing from this move, which was too short. The reply to the next move shows
-    the obstacle. For a later goal, the driver requests the usual distance.
+    The reply to the next move shows the obstacle. The first move was too short because of the
+    obstacle, so the driver does not learn from its distance. For a later goal, the driver therefore
+    requests the usual distance, not a longer one.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -139,10 +142,10 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn has a wrong rate, so the driver stops it and starts it again.
+    """A turn has a wrong rate, so the driver stops it and starts it again, with other motor units.
 
-    The stop takes long, or its reply is late, so the reply gives no angle. Instead, the driver
-    learns the motors' speed from the encoder. So the new turn has other motor units.
+    The reply to the stop gives no angle, because the stop takes long, or because the reply is late.
+    So the driver learns the motors' speed from the encoder, and finds the new units by it.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

@@ -69,7 +69,7 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 
 @pytest.mark.parametrize("trap", TRAPS)
 def test_a_planted_trap_is_found(trap: str) -> None:
-    """The model's table allows one command too many.
+    """A harmful command is added to the model's table of the commands that the driver may send.
 
     The search finds the failure that this command causes.
     """
@@ -82,7 +82,7 @@ def test_a_planted_trap_is_found(trap: str) -> None:
 def test_a_driver_that_does_not_wait_for_late_copies_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A modelled driver does not wait for late copies of commands.
+    """The model is changed: its driver does not wait for late copies of commands.
 
     The search finds a copy that does harm.
     """
@@ -93,10 +93,10 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A modelled driver uses the stop port (SL), and then sends the usual stop, SRM.
+    """The model is changed: after SL on the stop port, its driver sends SRM, the usual stop.
 
-    Before SRM, it does not find out whether a motion continues. The search finds that the server
-    hangs.
+    The real driver first sends queries that show whether a motion continues. Without them, SRM can
+    hang the server. The search finds this failure.
     """
 
     def sweeps(world: World) -> model.Step:
@@ -107,7 +107,7 @@ def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
 
 
 class Desk:
-    """The simulated firmware, which receives every datagram."""
+    """The simulated firmware for a comparison with the model. No datagram to it is lost."""
 
     def __init__(self) -> None:
         self.server = MartServer(MartSettings(quirks=FIRMWARE))
@@ -142,7 +142,11 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return the server's state without the parts that cannot be seen while its port is silent."""
+    """Return the server's state for a comparison.
+
+    A server whose command port is silent does not show its motion, nor why the port is silent.
+    These parts of its state are replaced by fixed values.
+    """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
     return server
@@ -152,8 +156,9 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    A busy server executes only the commands on its stop port, so only these are compared. ``L`` is
-    not compared after the stop port has stopped a motion (``released``).
+    A busy server executes only the commands on its stop port (SL and SS). So for a busy server,
+    only SL and SS are compared. ``L`` is not compared after the stop port has stopped a motion
+    (``released``).
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

@@ -41,7 +41,7 @@ def creeping(firmware: Firmware = "source") -> MartBench:
 
 
 def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
-    """Return a function that returns True only for the ``number``-th such command from now on."""
+    """Return a function that is True for one datagram: the ``number``-th ``word`` from now on."""
     since = len(bench.written)
     return lambda data: data.startswith(word) and bench.said(since).count(data) == number
 
@@ -266,9 +266,9 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 
 
 def test_a_server_without_these_commands_is_asked_once() -> None:
-    """A documented server does not support MCS, the direct control of the motors.
+    """A server that follows the manual does not support MCS (direct control of the motors).
 
-    The driver sends it only once.
+    The driver sends MCS only once, although the robot makes two straight moves.
     """
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):
@@ -333,9 +333,9 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
     """The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM.
 
-    The ``ok`` to MSM arrives twice, and the next check of the IMU (RST IMU) is lost. The driver
-    does not take the second ``ok`` for the reply to the check. Its notice says that the server
-    still reports a motion although the robot is at rest.
+    The server's reply ``ok`` to MSM arrives twice, and the driver's next RST IMU (check of the IMU)
+    is lost. The driver does not take the second ``ok`` for the reply to RST IMU. The driver's
+    notice says that the server still reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -115,7 +115,10 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """During a shock, an adapter pauses within a frame. All frames of the shock are returned."""
+    """A shock affects the IMU frames before and after a delta. Then the line is silent.
+
+    The adapter delivers the last frame in two parts. The decoder returns all frames.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
     shock = [
@@ -129,7 +132,10 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """An IMU frame of a knock arrives in two parts, and then a silence. The frame is returned."""
+    """The IMU frame of a knock arrives in two parts, and then the line is silent.
+
+    The decoder returns the frame.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))

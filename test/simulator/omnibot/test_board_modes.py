@@ -61,9 +61,9 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """On some boards, the three bytes that wake the board can come during the boot.
+    """Some boards can be woken during the boot, by the first three bytes that they receive.
 
-    After the boot, the first S is obeyed.
+    After the boot, such a board is awake, so it obeys the first S.
     """
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
@@ -203,7 +203,8 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
     """A board whose receiver looks for idle gaps discards an incomplete frame after a gap.
 
-    If the caller gives no times, the gap is measured in ticks.
+    The simulated board measures a gap by the times that the caller gives with the bytes. If the
+    caller gives no times, the simulated board measures the gap in ticks.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))
