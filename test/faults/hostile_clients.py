@@ -21,9 +21,9 @@ NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
 
 
 def two_commanders(rig: Rig) -> None:
-    """Let one commander send velocities and another one wheel rates.
+    """Let one commander send velocities while another commander sends wheel rates.
 
-    When both end, the robot must stop.
+    When both commanders end, the robot must stop.
     """
     publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
     rig.drive()

@@ -27,9 +27,9 @@ READ_S = 20e-6
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
 """Share of the wake-ups that busy loops delay, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of the wake-ups after which busy loops slow the process down, and for how long.
+"""Share of the wake-ups after which busy loops slow the process down for a while.
 
-``BEHIND_FOR_S``: the range of this duration, in s.
+``BEHIND_FOR_S``: the range of the duration of this slowdown, in s.
 """
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """Ranges of the delay of a wake-up in a slowed process, in s.

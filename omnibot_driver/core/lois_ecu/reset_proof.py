@@ -15,18 +15,18 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 # A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
 FEW_TURNS: Final = 0.3
 FEW_TICKS: Final = 2
-"""Largest assumed motion of a wheel after it was stopped: 0.4 s at 50 RPM."""
+"""Together, the largest assumed motion of a wheel after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
-"""Motion that no wheel can make between a reset and the next counts. If a count falls by this
-number or more, the board has obeyed the reset."""
+"""Together, a motion that no wheel can make between a reset and the next counts. If a count falls
+by at least this motion, and is then near zero, the board has obeyed the reset."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""If a count of at least this size becomes zero while the wheel is at rest, the board has obeyed
-the reset. Backlash of the gears can cause smaller changes."""
+"""Together, the smallest count that proves a reset of a robot at rest, if both counts are zero
+afterwards. Backlash of the gears can cause smaller changes."""
 UNPROVED_S: Final = 2.5
-"""Time in s after which the driver accepts counts near zero without a proof. If the counts were
-already near zero before, no proof is possible."""
+"""Time in s after which the driver accepts counts near zero without a proof. No proof is possible
+if the counts were already near zero before the reset."""
 
 
 class ResetProof:
@@ -36,7 +36,7 @@ class ResetProof:
 
     ``steady``: whether these counts had not changed for some time, so that the wheels were at rest.
 
-    ``ticks_per_revolution`` may be replaced at any time.
+    ``ticks_per_revolution``: may be changed at any time.
     """
 
     def __init__(self, before: Ticks | None, ticks_per_revolution: int, *, steady: bool) -> None:

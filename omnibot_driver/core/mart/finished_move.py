@@ -21,7 +21,7 @@ distance or turn.
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
-SLOW doubles the times per degree and inch.
+The word SLOW in a request doubles the times per degree and inch.
 """
 FULL, TWO = 0.6, 1.4
 """Shortest durations of one and of two complete runs of a move, as fractions of the usual one."""

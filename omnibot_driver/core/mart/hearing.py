@@ -66,7 +66,7 @@ class Hearing(Measuring):
             self._answered(answer, now)
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether a reply after a stop may be a copy, or answer an earlier request.
+        """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
 
         For example, it may be the ``ok`` to the start, or an encoder count.
         """

@@ -157,7 +157,7 @@ class Gains:
     """Gains of the manual's speed controller.
 
     feed_forward: in percent of duty per RPM.
-    low_pass: fraction of the remaining change of the target that each step applies, 0..1.
+    low_pass: 0..1, the part of the difference to the new target that each step applies.
     """
 
     kp: float

@@ -66,9 +66,9 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """One or two characters are lost from a line with an angle and its checksum.
+    """One or two characters are lost from a line with an angle and a checksum.
 
-    Even a board that accepts as much as possible reads no other angle.
+    The board never reads a different angle, even if it parses lines in the most tolerant way.
     """
     text = relayed(angle_deg)
     data = line(text, sums=True)

@@ -159,7 +159,7 @@ def assert_the_estop_is_the_answer_and_the_pause_continues(
 ) -> None:
     """Check the failed answer, release the e-stop, and check that only ~/start ends the pause.
 
-    Since ``mark``, a time in s, no ``start`` may have been sent.
+    ``mark``: a time in s. The driver must not have sent ``start`` from then until ~/start.
     """
     assert not answer.success
     assert "release it with ~/estop" in answer.message

@@ -81,7 +81,8 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
     """A frame of an undamaged stream is returned as soon as its last byte arrives.
 
-    There are two exceptions: its values jump, or its last byte may begin a header.
+    There are two exceptions. A frame whose values jump may be returned later, and so may a frame
+    whose last byte may begin a header.
     """
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
@@ -183,7 +184,8 @@ def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
 ) -> None:
     """Decoding starts at any of the first 345 bytes. All frames but at most two are returned.
 
-    For bytes that come in ticks or one by one, the test starts at every 9th or 23rd byte only.
+    To save time, not every start is tested in all cases. If the bytes come in ticks, every 9th byte
+    is a start. If they come one by one, every 23rd byte is a start.
     """
     ticks = ticks_of(name)[:40]
     stream = b"".join(ticks)

@@ -45,8 +45,8 @@ def test_motion_that_the_full_buffer_lost_is_in_odom_whatever_the_counter_shows(
     """The reader stalls for seconds while the robot drives.
 
     The first bytes arrive in one read or in three, and the following bytes are lost. The counter of
-    the next delta may be small, although the board has not restarted. A second later, odom is the
-    board's pose again.
+    the next delta may be small, as after a restart of the board, but the board has not restarted.
+    In all cases, odom is the board's pose again a second later.
     """
     bench = Bench(BoardSettings(seed=3, running=True))
     bench.open()

@@ -34,9 +34,10 @@ def words_of(counts: list[float]) -> tuple[int, ...]:
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """For any command, no payload contains a letter (S, P, R) or a header.
+    """For any command, the payload contains no letter (S, P, R) and no header.
 
-    If the board misses a frame's header, it reads the payload as letters or as other frames.
+    This matters because a board that misses a frame's header reads the payload as letters or as
+    other frames.
     """
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
