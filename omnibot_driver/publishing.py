@@ -37,9 +37,9 @@ RAW_DEPTH: Final = 1000
 byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Time of a simulated clock, in ns. From this time on, measurements are not published. It is a
-minute before the latest time that a stamp can express, because a stamp may be later than the
-clock."""
+"""Limit of a simulated clock, in ns. From this time on, the driver does not publish measurements. A
+stamp may be later than the clock, so the limit is a minute before the latest time that a stamp can
+express."""
 
 
 class Publishing:
@@ -97,8 +97,8 @@ class Publishing:
             Extra: self._publish_extra,
         }
         self.extras: Mapping[type, Callable[[Any, int], None]] = {}
-        """For each type of reading that only this board has: the function that publishes it. The
-        function receives the reading and its stamp in ns of ROS time."""
+        """Functions that publish the readings that only this board has, by the type of the reading.
+        Each function receives a reading and its stamp in ns of ROS time."""
 
     @property
     def settings(self) -> messages.MessageSettings:

@@ -279,8 +279,8 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """A sender's first message is 0.5 s late, so its clock seems to the driver to be behind.
 
-    For the next message, the driver therefore returns two possible times of sending: the estimated
-    one, and the one by the sender's clock. Here, the sender's clock is correct.
+    So for the next message, the driver finds two possible times of sending: an estimated time, and
+    the time by the sender's clock. Here, the sender's clock is correct.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -290,7 +290,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the driver returns only one time of sending for each message.
+    """After ten messages of a sender, the driver finds only one possible time of sending.
 
     This time is correct although the sender's clock is an hour behind.
     """

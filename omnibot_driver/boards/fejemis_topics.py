@@ -38,7 +38,7 @@ NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns. The board sends 66 angles per second.
-The driver does not publish those that come earlier."""
+If an angle comes earlier, the driver does not publish it."""
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")
 SERVICES: Final = {
@@ -269,7 +269,7 @@ class FejemisTopics:
 
 
 def _why_not_request(what: str, session: Session) -> str:
-    """Return why ``what``, a topic, device or job, is refused now; empty if it is not."""
+    """Return why a topic, device or job (``what``) is refused now; empty if it is allowed."""
     why: str = session.interlocks.why_not_request()
     if not why and session.state in ("disconnected", "connecting"):
         why = session.board.refusal or NOT_CONNECTED
@@ -277,7 +277,10 @@ def _why_not_request(what: str, session: Session) -> str:
 
 
 def _why_not_off(what: str, session: Session) -> str:
-    """Return why ``what``, now switched off, may still be on; empty if all ports are open."""
+    """Return why ``what`` may still be on after the command to switch it off.
+
+    The result is empty if all ports are open.
+    """
     why = NOT_CONNECTED if session.state == "disconnected" else session.interlocks.missing
     later = "; the driver switches it off again when all ports are open"
     return f"{what} may still be on: {why}{later}" if why else ""

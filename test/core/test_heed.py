@@ -37,9 +37,10 @@ REQUESTS = {400: Request.START, 700: Request.PAUSE, 1000: Request.START, 1300: R
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
     drives: bool, run: bool
 ) -> None:
-    """``process`` returns False after most reads that contain only IMU readings.
+    """``process`` returns False if nothing is left to do after a read.
 
-    The session then writes and reports nothing.
+    This is so for most reads that contain only IMU readings. After such a read, the session has
+    nothing to write and nothing to report.
     """
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
@@ -68,7 +69,8 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 def test_data_from_before_a_request_do_not_answer_it() -> None:
     """A request comes while older data is not processed yet.
 
-    The older data does not confirm the request. Only data that is received after the request does.
+    The older data does not confirm the request. Data that is received after the request confirms
+    it.
     """
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):

@@ -127,10 +127,10 @@ def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: b
 
 @pytest.mark.parametrize("waits", [ImuFrame((0, 0, -16384), (0, 0, -1)), DeltaFrame(7, 0, 0, 255)])
 def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: Frame) -> None:
-    """The last byte may begin a frame, so the decoder waits for more. Then the board is silent.
+    """The last byte of a frame may begin another frame, so the decoder holds the frame.
 
-    The mode is not known yet. When data come again, the old frame is not among their readings,
-    which have later stamps.
+    Then the board falls silent before its mode is known. When new data come, the driver does not
+    publish the held frame with them.
     """
     bench, rest = Bench(), encode(REST)
     bench.open()

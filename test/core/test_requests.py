@@ -166,7 +166,8 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
     """The first «Paused» text arrives 0.05 s after R, so it may be older than R.
 
-    The next text continues its numbers, so both show that the board has restarted.
+    The number in the next text follows the number in the first text. So both texts show that the
+    board has restarted.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()

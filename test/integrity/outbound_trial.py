@@ -135,7 +135,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip the writes that arrive undamaged and change nothing, except the last of these."""
+        """Skip writes that arrive undamaged and change nothing, but not the last such write."""
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (

@@ -162,8 +162,8 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again after some seconds.
 
-        By then, the driver's stall has ended. If the driver refuses the message again, it logs this
-        again.
+        If the driver has refused the message because of a stall, this stall is over by then. If the
+        driver refuses the message a second time, it logs this refusal too.
         """
 
         def publish() -> None:

@@ -283,7 +283,7 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """A command is doubled, but the robot drives equally fast, or it stops at a goal.
+    """A command is doubled, but the robot drives no faster than before, or it stops at a goal.
 
     In both cases, the tool recognises positional control.
     """

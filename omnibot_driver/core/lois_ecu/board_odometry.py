@@ -55,7 +55,7 @@ class OdometryReader:
         self._before = None
 
     def take(self, group: BoardOdometry) -> Told | None:
-        """Return what changed from the last report to ``group``.
+        """Return what changed between the last report and the new report ``group``.
 
         Return None for the first report, and for a report whose pose is not finite.
         """

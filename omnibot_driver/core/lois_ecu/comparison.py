@@ -51,8 +51,8 @@ UNFORESEEN: Final = 5.0
 """Limit, in standard deviations, of the difference between a reported and an expected count. Above
 this limit, the wheel's motion cannot be the cause: the counter may have restarted."""
 SAME_TICKS: Final = 0.6
-"""If a count has not changed, the filter is corrected only if the expected count differs by at
-least this number of ticks. With a smaller difference, the next tick may not be due yet."""
+"""Least difference, in ticks, between an unchanged count and the expected count at which the filter
+is corrected. With a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): limits of the difference
@@ -68,18 +68,19 @@ SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
 speed. It is added to the effect of ``SWINGING_M``."""
 LOST_PART: Final = (0.15, 0.35)
-"""While reports are lost, a wheel without counted ticks gets an error in its distance. Standard
-deviation of this error, as a fraction of the distance that the wheel rolls while reports are lost.
-First value: at a steady speed. Second value: at an oscillating speed."""
+"""Standard deviations of the error in a wheel's distance that lost reports cause, as a fraction of
+the distance that the wheel rolls while reports are lost. First value: at a steady speed. Second
+value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""If the board's odometry (0x20) corrects a distance by more than ``CORRECTED_TICKS``, this
-correction has an error: the filter is linear, but the motion of a starting wheel is not.
-``CORRECTED_PART``: standard deviation of the error, as a fraction of the part of the correction
-beyond ``CORRECTED_TICKS``."""
+"""``CORRECTED_PART``: standard deviation of the error of a distance after a correction by the board's
+odometry (0x20), as a fraction of the part of the correction beyond ``CORRECTED_TICKS``. Large
+corrections have this error because the filter is linear, but the motion of a starting wheel is not.
+"""
 LATE_PART: Final = 0.6
-"""If a report is late, a wheel without counted ticks gets an error in its distance. Standard
-deviation of this error, as a fraction of the distance that the wheel rolls during the delay."""
+"""Standard deviation of the error in a wheel's distance that a late report causes, as a fraction of
+the distance that the wheel rolls during the delay. Only a wheel without counted ticks has this
+error."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation, in RPM, of the true difference of two wheel speeds if the board's odometry
 shows that they are equal."""
@@ -245,9 +246,10 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the filter: since the last report, no wheel rolled more than ``ticks`` ticks.
+        """Correct the wheel speeds in the filter towards zero: the board odometry is unchanged.
 
-        This method does not correct a wheel whose speed the firmware does not measure.
+        ``ticks``: standard deviation of a wheel's distance since the last report, in ticks. A wheel
+        whose speed the firmware does not measure is not corrected.
         """
         motion = self._motion
         self.begin_odometry()

@@ -186,9 +186,9 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the robot is at rest after a Stop. None if the ticks cannot show it.
+        """Return whether the robot is at rest after a Stop. None if no tick report can show it.
 
-        The ticks show nothing if they are old. The ticks of the public firmware also show nothing
+        Old tick reports show nothing. The tick reports of the public firmware also show nothing
         after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
@@ -268,10 +268,10 @@ class LoisConversation:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return the set-points RPM 0/0. In a terminal mode, return nothing.
+        """Return the set-points RPM 0/0, or no bytes in a terminal mode.
 
-        In a terminal mode, the driver sends only Stop: the public firmware then reads at most 480
-        characters a second.
+        In a terminal mode, the public firmware reads at most 480 characters a second. So in this
+        mode, the driver sends only Stop (``stop``).
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 

@@ -39,9 +39,9 @@ the errors of the arrival times are too large."""
 ROLLED_OUT_TURNS: Final = 0.15
 ROLLED_OUT_TICKS: Final = 1
 STARTING_TURNS_PER_S: Final = 1 / 3
-"""Largest count that a wheel can reach in ``age`` s after a restart of the board, if it rolls out
-and starts again: ``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, and
-``ROLLED_OUT_TICKS`` ticks more."""
+"""Largest count that a wheel can reach within ``age`` s after a restart of the board. In this time,
+the wheel rolls out, and may start again. The limit is ``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S *
+age`` turns, plus ``ROLLED_OUT_TICKS`` ticks."""
 
 ClockUnit = Literal["ms", "ns"]
 

@@ -28,7 +28,7 @@ same.
 """
 
 STARTED_M: Final = 0.01
-"""If the robot has moved this distance in m, the current units are enough to turn the motors."""
+"""Distance in m after which it is certain that the current units are enough to turn the motors."""
 
 
 class Adjusting(Moves):

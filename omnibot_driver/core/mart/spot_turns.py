@@ -29,11 +29,14 @@ rate.
 more than a small error of the rate.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Limits for turns that something slows down, as fractions of the commanded rate.
+"""Limits of what the driver learns from turns that something slows down.
 
-``HELD``: once the motors' speed is known, the driver does not learn from a lower rate.
+Both are fractions of the commanded rate.
 
-``LEAST_LESSON``: until then, the driver learns this rate instead of a lower one.
+``HELD``: least measured rate from which the driver learns, if it has learned from a turn before.
+
+``LEAST_LESSON``: least rate that the driver learns. If the measured rate is lower, the driver
+learns this rate instead.
 """
 EVEN: Final = 0.15
 """Relative change of a turn's rate below which the driver learns from the turn."""
@@ -51,7 +54,7 @@ SAME, CORRECTIONS = 0.2, 2
 ``CORRECTIONS``: largest number of corrections for the same rate.
 """
 STEADY: Final = 0.03
-"""Relative change of the commanded rate above which it is regarded as a new rate."""
+"""Relative change above which a commanded rate is regarded as a new rate."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
@@ -82,7 +85,8 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn; after a request to set them (SSP), of the next turn.
+    ``units``: motor units of the last turn. The request SSP sets the units of the next turn; from
+    that request on, ``units`` has these. 0 at the beginning of a connection.
 
     ``seen_radps``: measured rate of the last turn, in rad/s.
 
@@ -207,7 +211,10 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the rate to learn: the measured one, but at least LEAST_LESSON of the command."""
+        """Return the rate to learn: the measured rate ``seen_radps``, but not less than a limit.
+
+        The limit is LEAST_LESSON times the commanded rate.
+        """
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
@@ -229,7 +236,9 @@ class SpotTurns:
     def stopped(
         self, degrees: float | None, uncounted_s: float, turned_s: float, *, disturbed: bool
     ) -> None:
-        """Evaluate the angle in the reply to the stop of a turn, or None if there was no angle.
+        """Evaluate a turn that was stopped.
+
+        ``degrees``: angle in the reply to the stop; None if there was no angle.
 
         ``uncounted_s``: time in s from the last count to the first stop command. ``turned_s``: time
         in s since the turn began. ``disturbed``: whether the network is disturbed, so that nothing
@@ -257,10 +266,12 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from the last turn if it was slow and this turn is fast.
+        """Forget what was learned from the last turn if that turn was slow and this turn is fast.
 
-        In that case, something held the robot in the last turn. Before a slow turn is learned from,
-        keep what is known. ``part``: this turn's measured rate divided by its commanded rate.
+        In that case, something held the robot in the last turn. If this turn is slow, store what is
+        known before the driver learns from it, so that the next turn can undo this lesson.
+
+        ``part``: this turn's measured rate divided by its commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
             # otherwise the driver would learn from both turns a dead zone that does not exist

@@ -28,13 +28,19 @@ from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 BLIND_S, TRIPS = 0.8, 5
-"""Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
+"""Longest time for which the robot may drive without a new measurement.
+
+It is BLIND_S (s), plus TRIPS times the average duration of an exchange.
+"""
 FROZEN_S, FROZEN_TIMES = 0.5, 3
-"""The robot is stopped if the heading is constant: the IMU may be dead, or the robot stuck.
+"""Limits of a constant heading. When it exceeds both limits, the driver stops the robot.
 
-``FROZEN_S``: the heading is constant for this time in s, plus the duration of two exchanges.
+The IMU may then be dead, or the robot stuck.
 
-``FROZEN_TIMES``: the heading is constant in this number of replies. On a slow network, fewer
+``FROZEN_S``: time in s for which the heading is constant. The average duration of two exchanges is
+added to this limit.
+
+``FROZEN_TIMES``: number of replies in which the heading is constant. On a slow network, fewer
 replies may be equal by chance.
 """
 NO_START_S: Final = 1.5
@@ -55,12 +61,13 @@ moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand still in a drive before it is regarded as blocked."""
 STUCK_S, COASTS_S = 0.5, 0.2
-"""Times in s for which the left wheel, which has no encoder, may turn unseen.
+"""Times in s for which the left wheel may turn unseen. The left wheel has no encoder.
 
-``STUCK_S``: before a stuck right wheel is noticed, if the server does not report the heading.
+``STUCK_S``: time until the driver notices that the right wheel is stuck, in motions in which the
+server does not report the heading.
 
-``COASTS_S``: after a stop, if the right wheel is already at rest. The server then ends the
-measurement of the motion, although the left wheel still coasts.
+``COASTS_S``: time for which the left wheel may still coast after a stop, if the right wheel is
+already at rest. The server has then already ended the measurement of the motion.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -284,9 +291,11 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Evaluate a reply that came after the driver has used the stop port.
 
-        If the server has only now answered a stop, its stop port could hang the next forward drive
-        (RM); see docs/boards/mart.md. A reply with a number does not show this. It answers an
-        earlier query, or the stop of a turn on the spot, which leaves the stop port free.
+        If this reply answers a stop, the server's stop port still waits for the end of the motion.
+        It could hang the next forward drive (RM); see docs/boards/mart.md.
+
+        A reply with a number is not a sign of this. It answers an earlier query, or the stop of a
+        turn on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

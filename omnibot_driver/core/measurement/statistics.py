@@ -24,8 +24,9 @@ class StreamStatistics:
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
     * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by this
-      period, is the number of IMU readings that the board has sent in this time. The missing ones
-      are counted as lost. None if each IMU reading contains the number of lost ones (``lost``).
+      period, is the number of IMU readings that the board has sent in this time. If fewer IMU
+      readings have arrived, the missing ones are counted as lost. The period is None if the board's
+      IMU readings themselves say how many readings were lost (``lost``).
     """
 
     imu_period_s: float | None = None

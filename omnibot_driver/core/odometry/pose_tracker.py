@@ -37,8 +37,8 @@ class PoseTracker:
     ) -> None:
         """Use new settings from the next motion on.
 
-        ``scale``: true distance and turn, divided by the reported ones. ``fastest``: in m/s and
-        rad/s.
+        ``scale``: true distance and turn, divided by the reported ones. ``fastest``: the robot's
+        largest speed in m/s and yaw rate in rad/s.
         """
         x, y, yaw = self._axis_signs
         linear, angular = scale
@@ -85,9 +85,10 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add to the best pose the lost motion that a pose of the board has shown.
+        """Add the motion during a gap, which a pose of the board has shown.
 
-        The published pose follows as fast as the robot could move.
+        ``tangent``: this motion. The best pose moves at once. The published pose follows it, but
+        not faster than the robot could move.
         """
         self.follower.correct(roll(self._part(tangent)), 0.0)
 

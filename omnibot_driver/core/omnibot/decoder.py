@@ -81,11 +81,11 @@ class FrameDecoder:
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
-        """For each frame of the last call, the number of discarded bytes right before it."""
+        """Number of discarded bytes right before each frame that the last call has returned."""
         self.at_rest = False
-        """Whether all received bytes are decoded, and pauses are normally only between frames.
+        """Whether all received bytes are decoded, and the line normally pauses only between frames.
 
-        If both are true, faster code may decode the next bytes.
+        If this is true, faster code may decode the next bytes.
         """
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
@@ -150,7 +150,10 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Accept ``data`` if it consists of due frames with usual content, else return False."""
+        """Accept ``data`` if it consists only of expected frames with usual content.
+
+        Return whether ``data`` is accepted.
+        """
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -291,10 +294,10 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """Yield each supposed frame before the first undecided one, and whether it is accepted.
+        """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
-        A frame is decided if later bytes cannot change the decision, or if the frame ends at the
-        position ``until`` or before.
+        A frame is decided if later bytes cannot change the decision. A frame that ends at the
+        position ``until`` or before is decided too.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

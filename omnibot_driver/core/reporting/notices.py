@@ -124,9 +124,10 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """Return the sentence as a list when its condition begins to hold; else an empty list.
+        """Return a notice as a list when the condition that it reports begins to hold.
 
-        Pass an empty sentence while the condition does not hold.
+        Otherwise return an empty list. ``sentence``: the notice; empty while the condition does not
+        hold.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []

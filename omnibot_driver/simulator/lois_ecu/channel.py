@@ -51,8 +51,8 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Ticks since the odometry last read this number; negative if the wheel truly turned
-        backward."""
+        """Encoder ticks since the board's odometry last used them; negative if the wheel truly
+        turned backward."""
         self.record: list[int] = []
         self.record_left = 0
         self._records_torque = False

@@ -58,7 +58,7 @@ class Motion:
 
     watching: whether the module ``alarms`` supervises the motion.
 
-    posts: number of notices about this motion, of a start or an end, that no port has taken yet.
+    posts: number of notices that this motion has started or ended, and that no port has taken yet.
 
     right, left: motor registers, as the server knows them.
 

@@ -65,7 +65,8 @@ class PlantFit:
     samples: int
     order: int
     marks: Marks | None = None
-    """The encoder's marks, or None if no pattern of position errors repeats with each turn."""
+    """Distances between the encoder's marks. None if the marks seem to be evenly spaced: in that
+    case, no pattern of position errors repeats with each turn."""
 
     @property
     def aic(self) -> float:

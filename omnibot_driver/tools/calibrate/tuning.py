@@ -83,7 +83,8 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    ``now``: the present gains. A motor's errors are divided by its errors with these gains.
+    ``now``: the present gains. To compare gains, each motor's errors with other gains are divided
+    by its errors with the present gains.
 
     Raises ToolError if no gains are within the limits.
     """
@@ -120,7 +121,10 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
 
 
 def _cost(behaves: Behaviour, reference: Behaviour) -> Array:
-    """Return the cost of this behaviour relative to ``reference``; infinite beyond the limits."""
+    """Return the cost of a motor's behaviour relative to the behaviour ``reference``.
+
+    The cost is infinite if the motor is not stable, or exceeds a limit of this module.
+    """
     cost = (
         behaves.command_error_s / reference.command_error_s
         + behaves.load_error_s / reference.load_error_s

@@ -152,7 +152,7 @@ def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
 
 
 def test_no_row_is_of_something_else() -> None:
-    """The tables contain no command or subscription that is not in the boards' help.
+    """Each command and each subscription in the tables is in the boards' help.
 
     The only exception is ``sub``, the command that subscribes.
     """

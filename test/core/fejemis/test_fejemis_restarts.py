@@ -139,10 +139,11 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 
 @pytest.mark.slow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
-    """The drive board restarts while only its port is away, and the computer stalls meanwhile.
+    """While only its port is away, the drive board restarts. The computer stalls, too.
 
-    The stall ends before the port is back, so it has delayed no line of the new connection. If such
-    a line seems late, the board has restarted. So the odometry does not jump.
+    The driver notices the restart, so the odometry does not jump. After a restart, the board's
+    lines seem to be late. A stall could also make lines late, but this stall has ended before the
+    port is back. So it has not delayed any line of the new connection.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)

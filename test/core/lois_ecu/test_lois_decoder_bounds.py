@@ -89,7 +89,7 @@ def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> No
     """A torque sample of 0/0 looks like the end of the record, but more samples follow.
 
     The decoder continues to read after this sample. The command byte of a torque record differs
-    between firmware and manual; both are tested.
+    between firmware and manual. The test uses both bytes.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

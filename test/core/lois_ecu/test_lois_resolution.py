@@ -161,9 +161,10 @@ def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
 
 @RESOLUTIONS
 def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
-    """A read is late by 2 s. The last reports in it have a clock in ns and counts near zero.
+    """A read is late by 2 s. Its last report has a clock in ns and counts near zero.
 
-    The board may have restarted in between, so the clock does not show when the reports came.
+    The board may have restarted before this report, so its clock does not show when the reports
+    came. Therefore the driver uses the arrival time of the read for all of them.
     """
     late_reads = LateReads(per_turn)
     for number in range(6):
@@ -189,10 +190,11 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 
 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
-    """The user sets the resolution while the driver waits for the result of a reset.
+    """The user sets a new resolution while the driver waits for the result of a reset.
 
-    A wheel rolls on by a quarter turn. By the new resolution, but not by the old one, its count is
-    near zero, which proves the reset.
+    After the reset, a wheel rolls on by 250 ticks. With the new resolution, this is a quarter turn,
+    so the count is near zero and proves the reset. With the old resolution, this would be four
+    turns, which would prove nothing.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

@@ -117,9 +117,9 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """The robot drives out and back. Clock and counts are near zero then, and a read is late.
+    """The robot drives out and back. When it is back, the board's clock wraps.
 
-    No restart is assumed.
+    Clock and counts are then near zero, and a read is late. But no restart is assumed.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, -2.6)

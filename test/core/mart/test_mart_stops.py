@@ -75,9 +75,9 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
 def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
     faults: NetworkFaults, seed: int
 ) -> None:
-    """On a bad network, motions follow each other. Then the driver shuts down.
+    """On a bad network, the driver executes several motions in a row. Then it shuts down.
 
-    The robot rests within 3 s, and the server answers.
+    The robot is at rest within 3 s after the shutdown began, and the server does not hang.
     """
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
@@ -220,10 +220,10 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
     firmware: Firmware,
 ) -> None:
-    """One motion follows another. The new one has its speed within 1.5 s.
+    """One motion follows another. The robot reaches the speed of the new motion within 1.5 s.
 
-    The driver may repeat the stop between them, and the server answers "no motion". The driver does
-    not take this answer for a sign of a restart.
+    Between the two motions, the driver may send the stop again. The server answers the second stop
+    with "no motion". The driver does not take this answer for a sign of a restart.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)

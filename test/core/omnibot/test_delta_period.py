@@ -111,10 +111,10 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """Frames come in the order that is usual at the set rate of deltas. This order has no cost.
+    """The order of frames has no cost only if it is the usual order at the set rate of deltas.
 
-    At 10 Hz, ten IMU frames come before a delta, and two deltas before a pose. At 25 Hz, it is four
-    IMU frames and five deltas.
+    At 10 Hz, ten IMU frames come before a delta, and two deltas before a pose. At 25 Hz, four IMU
+    frames come before a delta, and five deltas before a pose.
     """
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
@@ -173,9 +173,9 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """Deltas are lost at 10 Hz. A pose, which follows every second delta, shows their motion.
+    """Deltas come at 10 Hz, with a pose after every second delta. Some deltas are lost.
 
-    Odom is right again.
+    The next pose shows the motion of the lost deltas, so odom is right again.
     """
     on = Line(BoardSettings(running=True, delta_period_s=TEN_HZ_S))
     on.run(3.0)

@@ -359,7 +359,7 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
     """MCS, the direct control of the motors, sets the motor registers, the right one first.
 
-    The server then refuses all else until MSM.
+    From then on, the server refuses a new MCS and all motions, until MSM comes.
     """
     rig = Rig()
     assert rig.ask("MCS 100 120") == "ok"

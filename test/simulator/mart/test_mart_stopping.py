@@ -128,7 +128,7 @@ def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
 @pytest.mark.parametrize("stop", ["SL", "SS"])
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 30", "SRM")])
 def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str) -> None:
-    """A stop on the stop port (SL or SS) and one on the command port (SM or SRM) come together.
+    """The stop port gets a stop (SL or SS), and the command port gets SM or SRM at the same time.
 
     The command port hangs for ever. The motors are off.
     """

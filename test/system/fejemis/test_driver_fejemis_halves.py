@@ -20,7 +20,7 @@ from two_ports import DRIVE, FRONT, TwoPorts
 from omnibot_driver.simulator.fejemis import Firmware
 
 CALLS = 500
-"""Most calls of a service until its answer has the expected reason."""
+"""Largest number of times that a test calls a service until its answer has the expected reason."""
 
 Start = Callable[..., Any]
 STOP = "rc 2 0 0"
@@ -58,7 +58,8 @@ def test_a_brush_that_cannot_be_switched_off_now_is_no_success(
 ) -> None:
     """The front board is unplugged while the brush is on, and the user switches the brush off.
 
-    The answer names the missing port. When the board is back, the brush is off.
+    The service fails, and its answer names the missing port. When the board is back, the driver
+    switches the brush off.
     """
     assert probe.call(SetBool, "brush", data=True).success
     robot.wait_until(lambda board: board.vehicle.brush)

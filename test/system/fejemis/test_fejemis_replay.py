@@ -24,10 +24,10 @@ RAW: Final = [
 RECOGNISED: Final = 100
 """Number of packets after which a replay has recognised the Teensy on a line.
 
-A Teensy needs at least 1 s to send them.
+A Teensy needs at least 1 s to send this number of packets.
 
-A recording may lack the answers to the driver's first questions. A replay then recognises the
-Teensys by later packets.
+A recording may lack the answers to the driver's first questions. In that case, a replay recognises
+the Teensys only by later packets.
 """
 
 
