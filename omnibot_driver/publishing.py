@@ -102,7 +102,7 @@ class Publishing:
 
     @property
     def settings(self) -> messages.MessageSettings:
-        """Frames, standard deviations and wheels that messages are made with."""
+        """What messages contain besides measurements, such as names of coordinate frames."""
         return self._settings
 
     @settings.setter

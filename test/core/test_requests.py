@@ -265,7 +265,7 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
     """The board does not receive the R of a reset. The state changes to ``connecting`` only once.
 
-    It returns to ``nominal`` when the driver has seen that the board did not restart.
+    The state returns to ``nominal`` when the driver has seen that the board did not restart.
     """
     bench.hears = False
     bench.events.clear()

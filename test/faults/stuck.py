@@ -53,7 +53,9 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full while the driver opens it repeatedly. The driver must report this once.
+    """Keep the port full while the driver opens it repeatedly.
+
+    The driver must report only once that the port accepts no data.
 
     When the port accepts data again, the robot must stop.
     """

@@ -73,10 +73,10 @@ the distance that the wheel rolls while reports are lost. First value: at a stea
 value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""``CORRECTED_PART``: standard deviation of the error of a distance after a correction by the board's
-odometry (0x20), as a fraction of the part of the correction beyond ``CORRECTED_TICKS``. Large
-corrections have this error because the filter is linear, but the motion of a starting wheel is not.
-"""
+"""``CORRECTED_PART``: standard deviation of the error that remains in a distance after a correction
+by the board's odometry (0x20), as a fraction of the part of the correction beyond
+``CORRECTED_TICKS``. The filter is linear, but the motion of a starting wheel is not. So large
+corrections leave an error."""
 LATE_PART: Final = 0.6
 """Standard deviation of the error in a wheel's distance that a late report causes, as a fraction of
 the distance that the wheel rolls during the delay. Only a wheel without counted ticks has this

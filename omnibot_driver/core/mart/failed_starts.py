@@ -32,7 +32,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because it may move nevertheless.
 
-        ``arrived``: the reply certainly belongs to this start, and a copy is unlikely.
+        ``arrived``: whether the reply certainly belongs to this start, and the network is so good
+        that it hardly delivers a late copy of the start.
         """
         word = self._start
         assert word is not None

@@ -31,7 +31,7 @@ RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 ``RECORD_QUIET_S``: for each piece of the file after the first piece.
 """
 TIMES: Final = 3
-"""Largest number of times that the driver sends the request of a repeatable job (REPEATED)."""
+"""Largest number of times that the driver sends the request of a job in REPEATED."""
 
 CHECK: Final = "check controller and network"
 EXIT_LOST: Final = "if the server has ended, start it again; if it still answers, call again"

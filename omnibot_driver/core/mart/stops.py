@@ -204,7 +204,7 @@ class Stops(Ground, ABC):
         return packets
 
     def _stopped(self, now: float) -> None:
-        """End the stop after the server has answered it, and evaluate its result."""
+        """End a stop that the server has answered, and evaluate the result of the stop."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # the move was cut short
         self.conversation.settle(now)
@@ -320,7 +320,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:
-        """Begin to find out which motion is in progress, after the stop port was used."""
+        """Begin to ask which motion is in progress, after the driver has used the stop port."""
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
         """Return why a motion failed, as text. Refuse its direction if the cause is an obstacle."""

@@ -34,7 +34,7 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""If the content of a frame costs this much or more, the frame waits. The bytes after it then
+"""Least cost of a frame's content at which the frame must wait. The bytes after the frame then
 decide whether it is accepted."""
 DOUBT_BYTES: Final = 170
 """Number of uncertain bytes at which the decoder must decide. In nominal mode, the board sends this
@@ -47,7 +47,7 @@ CALM_S: Final = 10.0
 On a calm line, the decoder needs less evidence to accept the last byte of a frame.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""An uncertain frame is discarded when this number of certain frames has followed it."""
+"""Number of certain frames that must follow an uncertain frame before it is discarded."""
 
 
 @dataclass(slots=True)
@@ -179,7 +179,7 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """Accept consecutive frames until one is uncertain; return False if one is uncertain."""
+        """Accept consecutive frames until a frame is uncertain. In that case, return False."""
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
@@ -270,7 +270,10 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """Accept certain frames, discard uncertain bytes; return False if nothing was decided."""
+        """Accept frames that are certain, and discard bytes in which no frame is certain.
+
+        Return False if nothing was decided.
+        """
         state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)
         half = len(stretch) // 2 if len(stretch) == DOUBT_BYTES else 0

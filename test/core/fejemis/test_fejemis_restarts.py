@@ -27,7 +27,8 @@ RESTARTS = [
     for n, boot_s in enumerate((0.0, 0.4))
     for m, read_s in enumerate((0.001, 0.02, 0.1))
 ]
-"""Duration of a boot and time between two reads in s, and whether the board says that it starts."""
+"""Cases of a restart: duration of the boot in s, time between two reads in s, and whether the board
+sends its start line."""
 
 
 def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
@@ -117,8 +118,8 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 ) -> None:
     """The drive board restarts while its port is away, and its pose begins at zero again.
 
-    When the port is back, the board has run for ``away_s``: shorter or longer than before the
-    restart. The odometry does not jump in either case.
+    The port comes back ``away_s`` seconds after the restart. In this time, the board has run for
+    less or for more time than before the restart. The odometry does not jump in either case.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -167,7 +168,10 @@ def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_a
 
 @pytest.mark.slow
 def test_a_port_that_was_away_for_long_is_no_restart() -> None:
-    """The port is away for longer than the boards had run before. The boards have not restarted."""
+    """The ports are away for longer than the boards had run before. But no board restarts.
+
+    The driver reports no restart.
+    """
     bench = nominal()
     bench.close()
     bench.speaks = bench.hears = set()

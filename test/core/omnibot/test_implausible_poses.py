@@ -67,7 +67,7 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
 def test_any_readings_give_finite_estimates_and_never_a_certain_one(
     readings: list[DisplacementReading | PoseReading], use_board_pose: bool
 ) -> None:
-    """Any displacements and poses come. All estimates are finite.
+    """All estimates are finite, whatever displacements and poses come.
 
     The variances of x, y and yaw are at least 1e-6, so no estimate seems to be certain.
     """

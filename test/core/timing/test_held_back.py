@@ -53,7 +53,7 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """An adapter holds back data and loses some of it. In odom, the robot is never too fast.
+    """An adapter holds back data and loses some of it, but odom never shows an impossible speed.
 
     Two seconds after the adapter has delivered the data, odom is right.
     """
