@@ -30,7 +30,7 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    * ``deliver``: receives events, and the time of day, in ns, at which the session's time was 0.
+    * ``deliver``: receives events, and the time of day in ns that belongs to the session's time 0.
     * ``failed``: receives the exception that ended the thread. Such an exception is always a
       defect.
 

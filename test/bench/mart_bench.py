@@ -2,9 +2,9 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-The driver and the floor (the smallest program with the same output, without any checks) have a
-simulated controller each, on UDP. The driver sends a speed only after the reply to its current
-query. It sends a stop at once.
+The floor is the smallest program with the same output, without any checks. The driver has a
+simulated controller on UDP, and the floor has another one. If the driver waits for the reply to a
+query, it sends a new speed only after this reply, but it sends a stop at once.
 """
 
 import time

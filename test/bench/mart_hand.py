@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command several MART robots in turn, with another speed every 1 to 3 s, sometimes zero.
+"""Command several MART robots with the same speed, which changes every 1 to 3 s and may be zero.
 
-Arguments: seconds and namespaces. Output: a JSON list with an array for each namespace. Each speed
-has the steady clock's time in s of its first publication, and its value in m/s.
+Arguments: the duration in s, and the namespaces. Output: a JSON list with an array for each
+namespace. The array has a pair for each speed: the steady clock's time in s at which the speed was
+first published, and the speed in m/s.
 """
 
 import json
@@ -20,7 +21,7 @@ AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command the speeds to the robots in turn, and record the first publication of each speed."""
+    """Publish each speed to all robots, and record the first publication of the speed."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

@@ -2,7 +2,8 @@
 
 """The Fejemis in the fault campaign: two ports, lines of text with checksums, one robot.
 
-Published messages are not compared with the sent ones: the two boards send at different rates.
+The campaign does not compare the published messages with the data from the boards, because the two
+boards send at different rates.
 """
 
 import re
@@ -126,7 +127,7 @@ CASES: Final = {
 
 
 def cases(seed: int) -> dict[str, Case[Rig]]:
-    """Return the cases of any serial line and those of the Teensys. The keys are their names."""
+    """Return the cases of any serial line and the cases of the Teensys, by the name of the case."""
     return {**survivable(seed), **CASES}
 
 

@@ -2,7 +2,8 @@
 
 """The LOIS ECU in the fault campaign: lines of text, two wheels, no IMU.
 
-Published messages are not compared with the sent ones, because the driver predicts odometry.
+The campaign does not compare the published messages with the data from the board, because the
+driver predicts odometry.
 """
 
 from typing import Final

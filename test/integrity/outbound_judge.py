@@ -2,11 +2,13 @@
 
 """The judge of an outbound trial: it compares what the board understood with what the driver sent.
 
-- The driver *drives* from a motion write until the first frame of another kind.
-- A *commanded* set-point is in the current or the previous write.
-- An *uncommanded* set-point is in neither. It lasts until a commanded one, a pause or a reboot.
-- A *stray* motion frame is understood outside of a drive.
-- A *false* letter was not sent as a letter. An *added* letter comes from the line.
+- The driver *drives* from a write with motion frames until the first frame of another kind.
+- A *commanded* set-point is in the current or the previous write of the driver.
+- An *uncommanded* set-point is in neither of these writes. It lasts until a commanded set-point, a
+  pause or a reboot.
+- A *stray* motion frame is one that the board understands while the driver does not drive.
+- A *false* letter is a byte that the driver has sent, but not as a letter. An *added* letter is a
+  byte that faults of the line have added or changed.
 """
 
 import math
@@ -178,7 +180,7 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """End the scene. Return whether the robot still drives at the due time or at the end."""
+        """End the scene. Return whether the robot drives when it must be at rest, or at the end."""
         self.no_setpoint(at_s)
         if self.driving:
             self.score.driving_s += at_s - self._driving_from_s

@@ -22,9 +22,9 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit of the time between the arrivals of two successive samples, in periods.
 
-The limit is used if both samples are late by about a period or more. If the time between them
-exceeds the limit, a sample before them was lost. Otherwise no sample was lost: both samples have
-waited for a stalled host.
+The limit is used only if both samples seem to be late by about a period or more. If the time
+between their arrivals exceeds the limit, a sample before them was lost. If not, both samples have
+waited because the host stalled, and no sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""

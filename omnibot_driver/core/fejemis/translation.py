@@ -40,7 +40,7 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Age of the last IMU sample, in s, up to which an orientation is published with this sample."""
+"""Largest age, in s, of an IMU sample with which the driver publishes a later orientation."""
 
 
 class Translation:

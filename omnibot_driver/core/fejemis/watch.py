@@ -21,7 +21,7 @@ FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
 """Silence in s after which the user is notified that the board at an opened port is missing."""
 UNREAD_S: Final = 0.03
-"""If no line of either board was read for this time in s, missing data is not blamed on one board.
+"""Time in s without a line of either board, after which missing data is not blamed on one board.
 Each board sends at least every 15 ms. So the driver has read late, or both boards are cut off."""
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
@@ -32,7 +32,7 @@ SLACK_S: Final = 1e-6
 
 
 class Watch:
-    """The timeouts.
+    """The timeouts of a Fejemis: a silent board, an old angle of the front wheel, an old pose.
 
     ``blind``: whether the front wheel's angle is too old, or its sensor is faulty.
 
@@ -124,10 +124,10 @@ class Watch:
         return False
 
     def _look_at_reads(self, now: float) -> None:
-        """Check whether no line of either board was read for ``UNREAD_S``.
+        """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, missing data is not blamed on one board for the next ``OLDEST_S``. By then, the
-        driver has read the lines that were only waiting to be read.
+        If so, missing data is not blamed on one board for the next ``OLDEST_S``. In this time, the
+        driver reads the lines that have arrived but were not read yet.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

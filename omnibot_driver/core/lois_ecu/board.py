@@ -41,11 +41,14 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
-"""Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four tick
-reports have arrived. The last repetition comes less than ``UNPROVED_S`` before the driver gives the
-reset up. So after the last repetition, small counts that never change are not accepted."""
+"""Time in s after which a reset is repeated. After this time, stopped wheels are at rest, and four
+tick reports have arrived.
+
+The driver gives the reset up less than ``UNPROVED_S`` after the last repetition. So after the last
+repetition, it does not accept small counts that never change.
+"""
 STEADY_S: Final = 0.3
-"""Time in s. If the tick counts have not changed for this time, the wheels are regarded as at rest.
+"""Time in s without a change of the tick counts, after which the wheels are regarded as at rest.
 The time is longer than the usual period of the tick reports."""
 
 

@@ -90,9 +90,9 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether this report was read late: after more than ``LATE_S`` without reports,
-          and together with later tick reports.
-        * ``shown``: whether the board's clock shows how much time passed since the last ticks.
+        * ``late``: whether this report was read late. This means that no report arrived for more
+          than ``LATE_S``, and that this report then arrived together with later tick reports.
+        * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s
         if last is not None:

@@ -4,8 +4,8 @@
 
 The wheels are assumed to have the radius in the settings. Left and right are those of the board.
 
-Input: commands to the board, and values that the firmware counts or measures; it does not read
-reports.
+Input: commands to the board, and values that the firmware counts or measures. This module does not
+know the reports in which these values arrive.
 """
 
 import math
@@ -96,9 +96,12 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest expected difference, in m/s, between the measured speeds of the two wheels since
-        distances were last compared. While both speeds are equal, the public firmware does not
-        change the position that it reports."""
+        """Smallest difference, in m/s, that was expected between the two measured wheel speeds.
+
+        The smallest is chosen from all differences since the reported distance was last compared
+        with the estimate. While both speeds are equal, the public firmware does not change the
+        position that it reports.
+        """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 

@@ -45,9 +45,9 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""The speed controller of a wheel at rest integrates the speed error, and starts the wheel when the
-integral is ``WINDUP_M``. While the wheel does not tick, the integral is assumed to be at most this
-fraction of ``WINDUP_M``."""
+"""Largest assumed integral of a speed controller while its wheel does not tick, as a fraction of
+``WINDUP_M``. The controller of a wheel at rest integrates the speed error, and starts the wheel
+when the integral is ``WINDUP_M``."""
 
 
 class ReportedSpeed:
@@ -63,8 +63,8 @@ class ReportedSpeed:
         self._repeats = 0
         self._jumped = False
         self._doubted_m = 0.0
-        """Standard deviation in m that was added to the wheel's distance, because the wheel may be
-        at rest since its reported speed last changed."""
+        """Standard deviation in m that was added to the wheel's distance since the wheel's reported
+        speed last changed. Since then, the wheel may have been at rest."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
@@ -79,8 +79,8 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance added since it stopped.
 
-        The wheel is assumed to be at rest since its reported speed last changed, or since a later
-        command to start that the wheel did not obey.
+        The driver assumes that the wheel stopped when its reported speed last changed. If a command
+        to start came later, and the wheel did not obey it, the time of this command is used.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:

@@ -210,8 +210,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        Its reply is recorded as missing and may come late. The reply to a controlled move is not
-        recorded here, because the stop of the move waits for it.
+        The reply is recorded as missing and may come late. Exception: the reply to a controlled
+        move is not recorded here, because the driver waits for it while it stops the move.
         """
         if self.pending is None:
             return None
@@ -289,7 +289,7 @@ class Conversation:
         but: Word | None = None,
         kinds: frozenset[Kind] = frozenset(Kind),
     ) -> bool:
-        """Return whether an identical reply came within the last ``delay_s``.
+        """Return whether a reply identical to ``reply`` came within the last ``delay_s``.
 
         ``but``: the command whose replies are ignored. ``kinds``: only the replies to these kinds
         of commands are compared.

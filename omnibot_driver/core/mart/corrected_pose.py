@@ -93,9 +93,10 @@ class CorrectedPose:
             self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def lose_turn(self) -> None:
-        """Add the error of an unknown turn, because the server was restarted during a motion.
+        """Add the error of an unknown turn, for example after a restart of the server in a motion.
 
-        The motors keep their last command, and the server's relative heading begins at zero.
+        During a restart, the motors keep their last command, so the robot may turn. Afterwards, the
+        server's relative heading begins at zero, so it does not show this turn.
         """
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
@@ -111,9 +112,9 @@ class CorrectedPose:
     def _end_turn(self, *, may_be_recorded: bool) -> float:
         """End a turn on the spot, and return the correction of its angle in rad.
 
-        If the server has reported an implausible angle, there are two possible causes: it is the
-        angle of another motion, or only one of the wheels has turned. So the whole difference
-        between this angle and the one computed from the encoder count is added to the uncertainty.
+        An angle that the server has reported can be implausible for two reasons: it belongs to
+        another motion, or only one of the wheels has turned. So the whole difference between this
+        angle and the angle computed from the encoder count is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

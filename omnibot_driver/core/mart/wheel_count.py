@@ -24,7 +24,7 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""If this many counts are within 1 of the count before a start, the start is regarded as lost."""
+"""Number of counts within 1 of the count before a start, which show that the start was lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +45,13 @@ class Step:
 class WheelCount:
     """The count of the right wheel's encoder.
 
-    ``last``: last accepted count. ``told_s``, ``from_s``: its most probable and its earliest
-    possible time.
+    ``last``: last accepted count. ``told_s``: most probable time of the last count. ``from_s``:
+    earliest possible time of the last count.
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last count, if it differs by at most 1 from the count before the start command.
-    The start command may then be lost. 0 in all other cases.
+    ``maybe``: the last count, if it shows that the start command may be lost; otherwise 0. It shows
+    this if it differs by at most 1 from the count before the start command.
     """
 
     def __init__(self) -> None:
@@ -80,10 +80,12 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        Nothing changes if the server has acknowledged the motion. Otherwise there are two cases. If
-        counts of the motion have come, it had begun, so the server was restarted. The pose already
-        includes these counts. Without such counts, the motion did not begin, and the count
-        continues from its last value.
+        Nothing changes if the server has acknowledged the motion. Otherwise there are two cases:
+
+        - A count of the motion has come. The motion had begun, so the server was restarted. The
+          pose already includes the counts of the motion.
+        - No count of the motion has come. The motion did not begin, and the count continues from
+          its value before the start command.
         """
         if self._confirmed:
             return False
@@ -163,10 +165,10 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether an uncertain count is clearly nearer to zero than this motion's last one.
+        """Return whether an uncertain count contradicts the last count of this motion.
 
-        The result is also True if the two counts have different signs. Such a count is a wrong
-        reply.
+        It does if it is clearly nearer to zero than the last count, or has the other sign. Such a
+        count is a wrong reply.
         """
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:

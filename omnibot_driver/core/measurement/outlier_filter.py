@@ -35,24 +35,24 @@ CALMING: Final = 0.95
 """Factor by which the stored largest recent change shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""An implausible change of the IMU's readings was a spike only if at most this fraction of the
-change remains in the next reading.
+"""Largest fraction of an IMU spike that remains in the next reading. If more than this fraction of
+an implausible change remains, the change was not a spike.
 
 The fraction has a second use. If all other values of the reading change by at most this fraction of
 the largest change, only the value with the largest change is regarded as changed.
 """
 END_OF_SCALE: Final = 0.99996
-"""A reading of at least this fraction of the accelerometer's full scale is regarded as at the end
-of the scale. The largest positive reading of 16 bits is just above this fraction."""
+"""Fraction of the accelerometer's full scale from which on a reading is regarded as at the end of
+the scale. The largest positive reading of 16 bits is just above this fraction."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a displacement that changed implausibly much, and the
 poses after it."""
 ALIKE: Final = 2.0
-"""Two displacements are compared only if their durations differ by at most this factor, because the
-size of an implausible change depends on the duration."""
+"""Largest factor by which the durations of two displacements differ that are compared. The size of
+an implausible change depends on the duration."""
 BACK: Final = 0.25
-"""A displacement that changed implausibly much was a spike only if at most this fraction of the
-change remains in the next displacement."""
+"""Largest fraction of a displacement's spike that remains in the next displacement. If more than
+this fraction of an implausible change remains, the change was not a spike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +89,9 @@ class OutlierFilter:
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: whether the board corrects its own odometry. If so, an impossible but finite
-      displacement is passed on with ``measured`` False. If it has a duration, ``possible`` is False
-      too.
+    * ``corrected``: whether the board corrects its own odometry. If so, the filter does not reject
+      an impossible but finite displacement. It passes the displacement on with ``measured`` False.
+      If the displacement has a duration, its ``possible`` is False too.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -212,7 +212,7 @@ class OutlierFilter:
     def _told_of_losses(self, reading: Reading) -> Reading:
         """Return the reading; in a pose, ``lost`` also counts the rejected displacements.
 
-        The pose includes the motion of these displacements, so it replaces them.
+        The pose includes the motion of the rejected displacements, so they are not needed.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -295,9 +295,10 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether one flipped bit can explain the step of a value.
 
-        The step may differ from the bit by the recent variation of the readings. ``value``:
-        magnitude after the step. At the end of the scale, the result is False, because a knock can
-        cause such a value.
+        The step may differ from the bit by the recent variation of the readings.
+
+        ``value``: magnitude after the step. If this is at the end of the scale, the result is
+        False, because a knock can cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

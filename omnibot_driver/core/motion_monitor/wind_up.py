@@ -48,7 +48,8 @@ speed of a wheel."""
 class WindUp:
     """The wind-up of one robot.
 
-    ``way_m``: distance in m, at the rim of a wheel, that the robot may still make up for.
+    ``way_m``: size of the wind-up. This is the distance in m, at the rim of a wheel, that the
+    wheel controllers may still make up for.
     """
 
     def __init__(self) -> None:
@@ -64,9 +65,10 @@ class WindUp:
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
         """Subtract from the wind-up a motion that the set-points do not allow.
 
-        Return whether the wind-up was larger than this motion, and so explains it.
+        Return whether the wind-up explains this motion: whether it was larger than the motion.
 
-        ``way_mps``, ``turn_radps``: excess over the allowed velocities, during ``seconds``.
+        ``way_mps``, ``turn_radps``: excess of the motion over the allowed velocities. The motion
+        lasted ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -91,7 +93,7 @@ class WindUp:
 
         If the robot is not held, the wind-up decays.
 
-        ``motion``: mean twist during ``seconds``; the set-points allow it.
+        ``motion``: mean twist during ``seconds``. It must be a twist that the set-points allow.
 
         ``newest``: set-points that the robot may still be approaching, the current one first.
 

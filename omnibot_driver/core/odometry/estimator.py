@@ -34,8 +34,8 @@ POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Smallest standard deviation of the heading, in rad, at which the heading counts as unknown. Only
-the effect of lost displacements is included, until a pose of the board shows the lost motion."""
+"""Standard deviation, in rad, from which on the board's heading counts as unknown. Only the error
+by lost displacements is included, and only until a pose of the board shows the lost motion."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -221,8 +221,11 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether a pose is the first one, or shows a new frame after a suspected restart.
 
-        In both cases, the pose must confirm the last doubted pose (``confirmed``). Exception: after
-        a suspected restart, a pose that fits the motion since the restart is accepted at once.
+        * The first pose must confirm the last doubted pose (``confirmed``).
+        * After a suspected restart, a pose that fits the motion since the restart shows a new frame
+          at once. Any other pose must confirm the last doubted pose.
+        * A pose that fits the old frame ends the suspicion, so the result is False. A pose in the
+          old frame also does so if it is confirmed and the robot can have reached it.
         """
         if self._board is None:
             return confirmed
@@ -332,9 +335,11 @@ class Odometry:
         return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
-        """Add assumed motion for a gap that lasted ``seconds``.
+        """Add assumed motion for a gap.
 
-        ``stamped_s``: duration of the gap by the stamps before and after it, in s.
+        ``seconds``: duration of the gap, computed from the number of lost displacements.
+
+        ``stamped_s``: duration of the gap in s, computed from the stamps before and after it.
         """
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))

@@ -64,7 +64,7 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Return the duration of the gap in s according to the stamps, but at most ``unheard_s``.
+        """Return the duration of the gap in s, computed from stamps, but at most ``unheard_s()``.
 
         The gap lasts from ``last_stamp_s`` to the beginning of the first waiting displacement.
         """

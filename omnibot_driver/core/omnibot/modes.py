@@ -50,9 +50,10 @@ class ModeTracker:
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.mode = Mode.UNKNOWN
         self._imus_alone = self.imus_to_come = schedule.imus_alone
-        """``_imus_alone``: number of IMU frames in a row, without a delta, that show IMU-only mode.
+        """``_imus_alone``: number of successive IMU frames without a delta between them, after
+        which the driver assumes IMU-only mode.
 
-        ``imus_to_come``: how many of these frames have not arrived yet.
+        ``imus_to_come``: how many of these IMU frames have not arrived yet.
         """
 
     def apply(self, happening: Happening) -> None:

@@ -16,10 +16,11 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which /diagnostics must show the state "disconnected", if the driver still runs.
+"""Time in s from the beginning of the last state in the log. A driver that still runs reports this
+state in /diagnostics even later.
 
-If "disconnected" is the last state in the log, and /diagnostics does not show it after this time,
-the driver has ended.
+If the last state is "disconnected", and /diagnostics does not show it after this time, the driver
+has ended.
 """
 
 
@@ -79,9 +80,9 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Return whether diagnostics still reported this state 2 s (``SILENT_S``) after it began.
+    """Return whether /diagnostics still shows this state later than 2 s (``SILENT_S``).
 
-    Otherwise the driver had ended.
+    The time counts from the beginning of the state. If the result is False, the driver has ended.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

@@ -291,7 +291,7 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 
 
 def test_a_robot_that_is_pushed_a_little_keeps_its_goal(bench: Bench) -> None:
-    """The robot is at its goal and is pushed by hand. The board moves it back, without a notice."""
+    """A robot at its goal is pushed by hand. The board moves it back. No notice appears."""
     bench.go_to(0.3, 0.0, 0.0)
     bench.run(3.0)
     pushed = bench.board.odometry

@@ -139,7 +139,10 @@ def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
 
 
 def test_nothing_deviates_before_enough_groups_are_known() -> None:
-    """Too few tick reports have arrived, or the clock's unit is unknown. No delay is irregular."""
+    """No delay is regarded as irregular before enough tick reports have arrived.
+
+    The same applies while the unit of the board's clock is unknown.
+    """
     board = BoardTime()
     assert board.deviation_s(0, "ns", 5.0) == (0.0, False)
     board.late_s(0, "ns", 0.0)
@@ -152,7 +155,7 @@ def nanoseconds(board_s: float) -> int:
 
 
 def settled_on_time() -> BoardTime:
-    """Return the estimator after 60 tick reports, read in time, of a clock in ns."""
+    """Return the estimator after 60 tick reports that were read in time. The clock counts ns."""
     board = BoardTime()
     for step in range(60):
         board.late_s(nanoseconds(0.2 * step), "ns", 0.2 * step)

@@ -105,9 +105,10 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     ],
 )
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """One line of a group is damaged. The decoder drops that group.
+    """The decoder drops a group in which one line is damaged, and returns the next group.
 
-    If only the last line comes twice, the decoder returns the group, but it drops a GPS fix.
+    Exception: if only the last line of a group comes twice, the decoder returns the group. The
+    exception does not apply to a GPS fix.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -204,7 +205,7 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """A record that was not requested is discarded. The decoder returns its number of lines.
+    """The decoder discards a record that was not requested, and reports how many lines it had.
 
     Without a request, the decoder cannot detect that lines of a record are lost.
     """

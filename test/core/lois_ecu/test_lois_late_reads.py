@@ -78,9 +78,9 @@ def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
 
 
 def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
-    """The first ticks of a late read are often discarded as implausible.
+    """The first tick report of a late read is discarded as implausible, as often happens.
 
-    A report directly after them has a time between the ticks before and after.
+    The next report, a GPS report, gets a time between the tick reports before and after it.
     """
     found = read(listening(), 2.6, GpsTime(1, 2, 3), *ticks(2200, 2400, 2600))
     assert found == about(2.0, 2.2, 2.4, 2.6)
@@ -129,9 +129,9 @@ def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
 def test_times_never_decrease_and_are_not_after_the_arrival(
     told: list[tuple[int, float, bool]], unit: ClockUnit
 ) -> None:
-    """The clock shows any values, and the reports are read at any times.
+    """The times that the reports get never decrease, and are not after the arrival.
 
-    The times of the reports never decrease, and are not after the arrival.
+    This is true for any values of the board's clock, and for reports that are read at any times.
     """
     late_reads, clock_ms, now, last_s = listening(unit), 1800, 1.8, 1.8
     reports: list[Report] = []
@@ -200,7 +200,7 @@ def true_pose(bench: Bench) -> Pose:
 def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
     """The driver stalls for seconds during a drive, and then reads all reports at once.
 
-    The twist is never so high as if the robot had driven the whole distance in an instant.
+    The pose is right. The twist is plausible: the distance does not count as driven in an instant.
     """
     bench = Bench(firmware)
     error_m, _ = stalled_drive(bench, stall_s)
@@ -222,9 +222,9 @@ def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stal
 def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
     firmware: str, twist: BodyTwist, stall_s: float
 ) -> None:
-    """The driver stalls while a wheel rolls backward. The public firmware does not count its ticks.
+    """The driver stalls while a wheel rolls backward. The public firmware does not count this.
 
-    The error of the position is at most 6 cm, or within 3 sigma.
+    The error of the estimated position is less than 6 cm, or less than 3 sigma.
     """
     error_m, stddev_m = stalled_drive(Bench(firmware), stall_s, twist)
     assert error_m < max(0.06, 3 * stddev_m)

@@ -48,7 +48,7 @@ def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield each choice of up to ``most`` of ``length`` characters, by position, to be lost."""
+    """Yield the positions of the lost characters: each choice of at most ``most`` of ``length``."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 

@@ -63,8 +63,8 @@ def test_a_restart_shows_although_the_clock_wraps_at_that_time(
 ) -> None:
     """The board restarts shortly after its clock wrapped, or shortly before it would wrap.
 
-    The clock begins at zero, so its value hardly differs from that without a restart. The driver
-    still notices the restart, and the odometry does not jump back by the lost counts.
+    The clock begins at zero after the restart. Without the restart, it would be near zero too. The
+    driver still notices the restart, and the odometry does not jump back by the lost counts.
     """
     bench = Bench("documented")
     begin_drive(bench, speed_mps, 2.4, wrapped_for_s)
@@ -117,10 +117,10 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
-    """The robot drives forward and then back to where the counts are zero. The clock wraps then.
+    """The robot drives forward and then back to where the counts are zero.
 
-    In one variant, a read is late as well, so that the clock does not fit the arrival times. The
-    driver still assumes no restart.
+    The board's clock wraps when the robot arrives there. In one variant, a read is late as well, so
+    that the clock does not fit the arrival times. In both variants, the driver assumes no restart.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6

@@ -116,9 +116,10 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A download of the log sends EXIT, which ends the server. A stop then interrupts the download.
+    """A stop interrupts the download of the log, after the driver has sent EXIT.
 
-    The job's result asks the user to copy the file from the controller.
+    EXIT ends the server. Therefore the job's result asks the user to copy the file from the
+    controller.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -204,7 +205,10 @@ def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
 
 
 def with_a_copy_of_the_last_ok(bench: MartBench, job: Job) -> JobDone:
-    """Return the result of ``job``, after a copy of an earlier ``ok``. Replies take 0.1 s."""
+    """Return the result of ``job``. A copy of an earlier ``ok`` arrives before the job's replies.
+
+    Each reply takes 0.1 s.
+    """
     bench.board.ask(job, "token", bench.now)
     bench.run(0.01)  # the reply to the pending query comes
     inner, coming = bench.robot.advance, list[tuple[float, Packet]]()

@@ -149,8 +149,8 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """The robot drives half as far as requested. Queries are lost for 0.7 s after the move.
 
-    The driver stops a possible second run. As it does not know how far the robot drives, it adds
-    nothing to the pose.
+    The driver sends a stop, because a second run is possible. It does not know how far this robot
+    drives in one run, so it adds nothing to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -174,8 +174,8 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
     """The reply to each turn is lost. The driver sends a stop, and the server answers "no motion".
 
-    This shows that the turn was completed. Its encoder count began at zero, so the odometry must
-    not subtract the last count of the drive before it.
+    This shows that the turn was completed. The encoder count of the turn began at zero, so the
+    odometry must not subtract the last count of the drive before the turn.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -192,10 +192,10 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 
 
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
-    """After a turn, the driver reads only the encoder, and begins the next straight move.
+    """After a turn, the driver reads only the encoder, then begins the next straight move.
 
-    The first heading after the straight move still contains the turn. The odometry has already
-    counted the turn by the encoder, and does not add it again.
+    The first heading that it reads after the straight move contains the turn. The odometry has
+    already counted the turn by the encoder, so it does not add the turn again.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))
@@ -248,10 +248,10 @@ def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware
 
 
 def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
-    """A HELLO is sent before a move. It arrives during the move, ahead of a copy of the move.
+    """A HELLO that was sent before a move arrives during the move, ahead of a copy of the move.
 
-    The server answers HELLO before it runs the copy. The driver does not conclude from this answer
-    that no copy runs, and stops the copy.
+    The server answers HELLO before it runs the copy, so the answer does not prove that no copy
+    runs. The driver stops the copy.
     """
     bench = MartBench("source").ready()
     network, late = bench.robot.network[0], list[bytes]()

@@ -25,7 +25,7 @@ IMU_LENGTH = 14
 DRIFT = 1.0002
 """Real period of the adapter's timer by the board's clock, divided by its nominal period.
 
-Because of the difference, the adapter's packets end in turn at all phases of a tick.
+The difference makes the adapter's packets end at all phases of a tick, one phase after the other.
 """
 
 Handed = Iterator[tuple[float, bytes]]

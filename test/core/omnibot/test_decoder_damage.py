@@ -195,9 +195,9 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A «Paused: i» text has lost one character. The text is not returned.
+    """A «Paused: i» text that has lost one character is not returned.
 
-    There is one exception: only the blank before the line feed is missing.
+    Exception: a text in which only the blank before the line feed is missing may be returned.
     """
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
@@ -258,9 +258,10 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """A frame ends in FF, which may begin a header, and waits. After a silence, more bytes come.
+    """A frame ends in FF, which may begin a header, so the decoder holds the frame.
 
-    The silence shows that the FF belongs to the frame. The frame is returned before the next one.
+    A silence shows that the FF belongs to the frame. The decoder returns the frame before the one
+    that comes after the silence.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
@@ -270,9 +271,9 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """A complete frame was held. If the decoder is in step, ``flush`` returns this frame.
+    """``flush`` returns a complete frame that the decoder has held. It returns no incomplete frame.
 
-    An incomplete frame is never returned.
+    Before the decoder is in step, ``flush`` does not return a complete frame either.
     """
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()

@@ -89,7 +89,8 @@ class TwoPorts(InBatches[SimulatedFejemis]):
     def stands_for_good(self) -> None:
         """Wait until both driving wheels have been at rest for 0.8 s.
 
-        By default, ``cmd_vel_timeout`` is shorter, so earlier commands have then expired.
+        The default ``cmd_vel_timeout`` is shorter than this time. So after this time, no earlier
+        command can move the robot.
         """
         since: list[int] = []
 
