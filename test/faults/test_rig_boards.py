@@ -12,9 +12,10 @@ from walk import CALLS, steps_of
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """Every board has faults to inject.
+    """Every board has at least one fault that the campaign injects.
 
-    Each name in its ``without`` is a fault or a part of the campaign.
+    ``without`` names what the campaign leaves out for the board. Each of these names exists, as a
+    fault or as a part of the campaign.
     """
     kind = load(board)
     own = (kind.cases or survivable)(0)
@@ -31,7 +32,7 @@ def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> N
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_a_random_walk_calls_only_services_that_the_board_has(board: str) -> None:
-    """A random walk has faults for every board. It calls only services that the board has."""
+    """The campaign's random walk with a board has faults, and calls only the board's services."""
     kind = load(board)
     steps = steps_of(kind)
     assert {CALLS[name] for name in steps if name in CALLS} == kind.services & {*CALLS.values()}

@@ -154,9 +154,10 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return "false letter" or "".
 
-        The letter is false if it is a byte of the write that was not sent as a letter. ``at``:
-        position of the letter in the write. A letter that the line added or changed has a negative
-        position.
+        The letter is false if it is a byte of the driver's write that was not sent as a letter.
+
+        ``at``: position of the letter in the write. If faults of the line have added or changed the
+        letter, the position is negative.
         """
         if at < 0:
             self.score.added_letters += 1

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Picture of squares of 5 m that a simulated LOIS ECU drives: the true path and that of ``odom``.
+"""Picture of squares of 5 m that a simulated LOIS ECU drives: the true path, and ``odom``'s path.
 
-With each firmware variant, it drives one square to the left and one to the right. The errors are
-printed as rows of a table.
+With each firmware variant, the robot drives one square to the left and one square to the right. The
+program prints the errors of ``odom`` as rows of a table.
 """
 
 import math

@@ -112,7 +112,7 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
     """A robot obeys if it reaches a fifth of the command. Otherwise the tool reports an error.
 
-    Very slow commands are not judged. NaN is not a motion.
+    A very slow command is not judged. A robot whose measured velocity contains NaN does not obey.
     """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)

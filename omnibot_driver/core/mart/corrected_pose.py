@@ -78,10 +78,11 @@ class CorrectedPose:
         return True
 
     def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add the first of two runs of the last move to the pose. Only the second was measured.
+        """Add the first of two runs of the last move to the pose.
 
-        A duplicate of the request has started the second run. ``amount``: the expected distance of
-        a complete run in m, or its turn in rad.
+        A duplicate of the request has started the second run. Only the second run was measured.
+
+        ``amount``: the expected distance of a complete run in m, or its expected turn in rad.
         """
         if is_straight:
             self.pose = self.pose.moved(Pose(amount, 0.0, 0.0))

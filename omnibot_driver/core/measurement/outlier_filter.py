@@ -48,8 +48,8 @@ MOST_HELD: Final = 10
 """Largest number of readings that are held: a displacement that changed implausibly much, and the
 poses after it."""
 ALIKE: Final = 2.0
-"""Largest factor by which the durations of two displacements differ that are compared. The size of
-an implausible change depends on the duration."""
+"""Largest ratio of the durations of two displacements that the filter compares. The size of an
+implausible change depends on the duration."""
 BACK: Final = 0.25
 """Largest fraction of a displacement's spike that remains in the next displacement. If more than
 this fraction of an implausible change remains, the change was not a spike."""

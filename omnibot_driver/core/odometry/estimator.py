@@ -127,8 +127,8 @@ class Odometry:
         """Move the origin of the odometry frame to the robot's current pose.
 
         Return the estimates of displacements that were still waiting for a pose. Displacements that
-        waited for the board's first pose are discarded. If the next displacement contains a pause,
-        its motion is discarded too.
+        waited for the board's first pose are discarded. If the duration of the next displacement is
+        unknown, its motion is discarded too, because most of it is older than the reset.
         """
         self.alignments += 1
         due = []

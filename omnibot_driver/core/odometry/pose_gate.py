@@ -70,8 +70,8 @@ class PoseGate:
         If it does not agree, ``doubted`` is counted as refused. In any case, ``doubted`` is then
         forgotten. Without a ``doubted`` pose, the result is False.
 
-        ``gap``: covariance of the lost motion, which belongs to lost displacements, and which no
-        pose has shown yet. It increases the tolerated difference.
+        ``gap``: covariance of the motion that is unknown because displacements were lost, and no
+        pose has shown their motion yet. It increases the tolerated difference.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)

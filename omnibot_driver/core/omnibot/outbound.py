@@ -24,7 +24,7 @@ from omnibot_driver.core.omnibot.frames import (
 MAX_WORD: Final = 32767
 
 ZEROS: Final = bytes(8)
-"""Zeros before Stop, the emergency stop or a letter.
+"""The zeros that are sent before Stop, the emergency stop or a letter.
 
 If the previous frame lost its end, seven zeros complete it. An eighth zero is sent, because one may
 be lost. Three zeros wake a board.
@@ -32,10 +32,10 @@ be lost. Three zeros wake a board.
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
-"""Zeros before a motion frame.
+"""The zeros that are sent before a motion frame.
 
-If the previous frame lost its end, the zeros may complete it as a wrong command. They are few, so
-that the motion frame soon replaces this command.
+If the previous frame lost its end, the zeros may complete it as a wrong command. Only a few zeros
+are sent, so that the motion frame soon replaces the wrong command.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

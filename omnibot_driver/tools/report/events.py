@@ -80,9 +80,9 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Return whether /diagnostics still shows this state later than 2 s (``SILENT_S``).
+    """Return whether /diagnostics shows this state more than 2 s (``SILENT_S``) after it began.
 
-    The time counts from the beginning of the state. If the result is False, the driver has ended.
+    If the result is False, the driver had ended.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

@@ -218,7 +218,8 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
     """The tick counts of one report jump, so the decoder discards the report.
 
-    If the next report continues from the new counts, it is returned: the board has restarted.
+    If the next report continues from the new counts, the board has restarted. The decoder then
+    returns the next report.
     """
     decoder = LoisDecoder()
     said = [

@@ -78,7 +78,7 @@ def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
 
 
 def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
-    """The first tick report of a late read is discarded as implausible, as often happens.
+    """The first tick report of a late read is discarded as implausible, which often happens.
 
     The next report, a GPS report, gets a time between the tick reports before and after it.
     """
@@ -222,9 +222,10 @@ def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stal
 def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
     firmware: str, twist: BodyTwist, stall_s: float
 ) -> None:
-    """The driver stalls while a wheel rolls backward. The public firmware does not count this.
+    """The driver stalls while a wheel rolls backward.
 
-    The error of the estimated position is less than 6 cm, or less than 3 sigma.
+    The public firmware does not count the ticks of a wheel that rolls backward. The error of the
+    estimated position is less than 6 cm, or less than 3 sigma.
     """
     error_m, stddev_m = stalled_drive(Bench(firmware), stall_s, twist)
     assert error_m < max(0.06, 3 * stddev_m)
