@@ -29,13 +29,14 @@ def obeying(
 ) -> Callable[[Any, MessageInfo], None]:
     """Return a callback that passes each message to ``action``, with the session of the link.
 
-    An old message is refused instead.
+    A message that was in transit for too long is refused instead. ``may_be_old`` and ``is_stop``
+    can except a message from this rule.
 
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: returns True for a message whose time in transit does not matter.
     * ``is_stop``: returns True for a command to stop, which is obeyed even if it is old.
     * ``ends_goal``: returns True for a command that ends a drive to a goal even if it is refused.
-      The function may raise CommandRefused for an invalid message.
+      ``ends_goal`` may raise CommandRefused for an invalid message.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()

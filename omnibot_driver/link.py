@@ -34,15 +34,16 @@ STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
 driver waits longer."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard process can
-repeat Stop afterwards. It replaces the shorter ``STANDS_WITHIN_S``."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest. It replaces the shorter
+``STANDS_WITHIN_S`` if no guard process can repeat Stop afterwards."""
 SILENCE_S: Final = 0.25
 """Longest wait at shutdown, in s, for a second proof that the robot is at rest. For a slow board,
 the driver waits longer. The driver sends nothing during this wait. So the second proof shows that
 the last Stop was not damaged on the line: a damaged Stop might move the robot."""
 BOTH_PROOFS_S: Final = 2.4
-"""Longest sum of both waits, in s, even for a slow board. The process ends itself after
-``driver.LONGEST_END_S``. If there is no proof, the guard needs part of this time to repeat Stop."""
+"""Longest sum of the waits for the first and the second proof, in s, even for a slow board. The
+process ends itself after ``driver.LONGEST_END_S``. If there is no proof, the guard needs part of
+this time to repeat Stop."""
 
 T = TypeVar("T")
 

@@ -54,9 +54,9 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
-    """The pipe from the driver to the guard breaks. The guard repeats the stop bytes, then ends.
+    """The pipe from the driver to the guard breaks.
 
-    The first stop bytes may be lost.
+    The guard repeats the stop bytes, because the first ones may be lost. Then the guard ends.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)

@@ -182,9 +182,10 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 
 
 def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
-    """The simulated clock has not begun. The result of a board's own request is passed on.
+    """The simulated clock has not begun. Results of requests are nevertheless passed on.
 
-    A measurement that only this board has is not published, because it would need a stamp.
+    A result needs no stamp. A measurement of a type that only one board has needs a stamp, so it is
+    not published.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)

@@ -63,10 +63,10 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion monitor has stopped the robot. The sender then sends invalid or late commands.
+    """The motion monitor has stopped the robot. Then only invalid or late commands are sent.
 
-    The robot may move again only after the sender has been silent. Refused commands show that the
-    sender is not silent, so its next valid command is refused, too.
+    The robot may move again only after the sender has been silent. Invalid and late commands show
+    that the sender is not silent, so its next valid command is refused, too.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -80,9 +80,9 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot. Then a stall makes the driver refuse commands.
+    """The motion monitor has stopped the robot. Then commands are refused because of a stall.
 
-    Their sender does not count as silent, so its next command is refused, too.
+    These commands show that their sender is not silent, so its next command is refused, too.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -100,9 +100,10 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot, and no command came for ``cmd_vel_timeout``.
+    """After a stop by the motion monitor, the sender pauses for ``cmd_vel_timeout``.
 
-    Then a sender begins with a late command. Its next command is obeyed.
+    Motion is then allowed again. A late command does not change this: it is refused, but the next
+    command is obeyed.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

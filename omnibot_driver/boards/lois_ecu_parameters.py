@@ -135,7 +135,7 @@ DRIVING: Final = (
         200,
         "",
         "Length of a record (~/record_rpm, ~/record_torque, ~/record_heading), in samples of each"
-        " wheel or in headings. The board never completes a longer record than 1024.",
+        " wheel or in headings. The board never completes a record of more than 1024.",
         low=1,
         high=MOST_SAMPLES,
     ),

@@ -169,7 +169,8 @@ class Board(Protocol):
     def discard(self) -> None:
         """Discard the bytes that are held for decoding, because a long silence has followed them.
 
-        A reading that later bytes complete would get the arrival time of those bytes.
+        Otherwise, later bytes might complete a reading, which would get the arrival time of these
+        later bytes.
         """
         return
 

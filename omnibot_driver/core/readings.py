@@ -83,8 +83,8 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    * ``continues``: whether the previous report was the same, and the board has not restarted
-      since.
+    * ``continues``: whether the board's previous report also said this, and the board has not
+      restarted since.
     """
 
     continues: bool = False
@@ -99,7 +99,8 @@ class OdometryReading:
     * ``twist_variances``: of linear and angular speed, in m²/s² and rad²/s².
     * ``rolled``: sum of the tangents (twist x time) that the wheels have measured since the board
       object was made, in the board's body axes.
-    * ``rolling``: twist by which ``rolled`` changes; None while the board does not report it.
+    * ``rolling``: present rate of change of ``rolled``, as a twist; None while the board does not
+      report it.
     """
 
     stamp_s: float

@@ -2,7 +2,7 @@
 
 """One open serial port or pyserial URL.
 
-Every LinkError says what to do. This module knows ports; it knows neither threads nor boards.
+Every LinkError says what to do. This module knows ports; it does not know threads or boards.
 """
 
 import contextlib
@@ -182,7 +182,7 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes, and sleep while the port accepts none. pyserial would not sleep.
+    """Write all bytes. While the port accepts none, sleep; pyserial would not sleep.
 
     Raises TimeoutError if, after 0.2 s (``WRITE_TIMEOUT_S``), the port still does not accept the
     rest of the bytes.

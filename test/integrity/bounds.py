@@ -23,15 +23,15 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 class Bound:
     """The limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``: at most one decoded frame in this number may be wrong. With ``None``,
-    every decoded frame must be right. This limit is for chunkings that show the line's idle gaps
-    to the parser.
+    ``one_wrong_in_visible``: the number N in "at most one decoded frame in N may be wrong". None:
+    every decoded frame must be right. This limit is for chunkings that show the line's idle gaps to
+    the parser.
 
-    ``one_wrong_in_hidden``: the same for chunkings that hide the idle gaps.
+    ``one_wrong_in_hidden``: the same number for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of the intact frames that must be decoded. With 1.0, every intact
-    frame after the first two must be decoded. While busy loops run, 99.9 % of all intact frames
-    are enough.
+    ``delivered``: least share of the intact frames that must be decoded. 1.0: every intact frame
+    after the first two must be decoded. For the chunkings in ``BUSY_LOOPS``, a share of 99.9 % is
+    enough.
 
     ``chunkers``: names of the chunkings that have these limits.
     """
@@ -50,9 +50,10 @@ class Bound:
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
-        """Return the least share of the intact frames that must be decoded.
+        """Return the least share of the intact frames that must be decoded with this chunking.
 
-        The share is smaller with chunkings in which adapter and reader are both late.
+        For the chunkings in ``BUSY_LOOPS``, the share is at most 99.9 %, because both adapter and
+        reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
@@ -89,16 +90,17 @@ The limits for added bytes apply only to chunkings that deliver several frames a
 """
 
 Scores = dict[tuple[str, str, str], Score]
-"""The scores. A key consists of the names of a fault, a chunking and a scenario."""
+"""Scores by the names of a fault, a chunking and a scenario."""
 
 PLAIN_CHUNKING = "whole bursts"
-"""The only chunking for the plain parser. With any other, this parser's result is the same."""
+"""The only chunking for the plain parser, whose result does not depend on the chunking."""
 
 
 def chunkings(fault: str) -> dict[str, Chunker]:
-    """Return the chunkings that are tested with a fault.
+    """Return the chunkings with which this fault is tested.
 
-    Chunkings in which the reading process is late are tested with only some of the faults.
+    Only the faults in ``BUSY_FAULTS`` are tested with chunkings in which the reading process is
+    late.
     """
     return CHUNKINGS if fault in BUSY_FAULTS else CHUNKERS
 

@@ -40,10 +40,11 @@ class Bound:
 
     ``share``: largest share of the driving time with an uncommanded set-point.
 
-    ``long_in``: N of "at most one uncommanded set-point of over 2 ms in N control frames".
+    ``long_in``: the number N in "at most one uncommanded set-point of over 2 ms in N control
+    frames".
 
-    ``overdue``: whether it is an error if the robot still drives when it must be at rest, or at the
-    end of the trial.
+    ``overdue``: whether a robot that still drives is an error. A robot still drives if it moves
+    when it must be at rest, or at the end of the trial.
     """
 
     share: float = 1.0

@@ -44,11 +44,11 @@ RECEIVERS: Final = {
     for letters in ("between", "anywhere")
 }
 Scores = dict[tuple[str, str, str], Score]
-"""The scores. A key consists of the names of a fault, a receiver and a scene."""
+"""Scores by the names of a fault, a receiver and a scene."""
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield the kinds of board on which a scene runs, all with this receiver.
+    """Yield the kinds of board on which a scene runs. All of them have the receiver ``receiver``.
 
     Each item is a name and a kind of board. The scores of kinds with the same name are added.
     """

@@ -24,7 +24,7 @@ LOSSES = (0.0, 1e-3, 1e-2)
 SCENARIOS = {"nominal": "driving", "IMU only": "IMU only, noisy gyro"}
 BLOCKS = "4096-byte blocks"
 BLOCKS_SETTLED_S = 6.0
-"""Time in s after which the driver's clock has settled if data comes in large blocks.
+"""Time in s after which the driver's clock has settled on a line that delivers large blocks.
 
 Two blocks arrive in this time.
 """
@@ -33,8 +33,8 @@ LIMITS_S = (0.2e-3, 0.5e-3)
 Cell = tuple[str, float, str, str]
 """One case of the report: the line, the share of lost bytes, the mode, and the event."""
 Figures = tuple[float, float]
-"""Result for one stream: the unevenness, and half the width of the interval with 99 % of the
-errors, both in s."""
+"""Two results for one stream, in s: the RMS error of the steps between stamps, and half the width
+of the interval that contains 99 % of the stamps' errors."""
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:

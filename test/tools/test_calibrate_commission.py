@@ -76,9 +76,9 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_a_speed_limit_is_not_taken_for_positional_control(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The driver's speed limit is below the speed of the check. The tool asks for a higher limit.
+    """``max_linear_speed`` is below a speed that the tool needs. The tool asks for a higher limit.
 
-    Without this check, the robot would not drive at the speed of the faster command. The tool would
+    With the low limit, the driver would reduce the faster of the tool's commands. The tool would
     mistake this for positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:

@@ -48,7 +48,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` at each of its calls, from ``AFTER_S`` seconds on."""
+    """Return a callback. From ``AFTER_S`` seconds on, each call of it calls ``action``."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -232,9 +232,10 @@ def test_a_motion_is_not_evaluated_if_the_clocks_differ(
 
 
 def test_parameters_are_restored_after_an_interruption(robot: Robot, rigged: Rig) -> None:
-    """Ctrl-C interrupts a measurement for which the tool has set a parameter of the driver.
+    """The tool sets a parameter of the driver for a measurement. Then ctrl-C interrupts the tool.
 
-    After that, the tool can set no parameter for a measurement, but it can restore former values.
+    After ctrl-C, the tool can still restore former values, but it can set no parameter for a
+    measurement.
     """
     robot.set_parameters({"linear_scale": 60.0})
     os.kill(os.getpid(), signal.SIGINT)

@@ -87,9 +87,9 @@ def test_the_way_is_bounded() -> None:
 
 
 def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
-    """The pose jumps farther than the robot can move, as after a reset of odometry.
+    """The pose jumps farther than the robot can move.
 
-    A new path begins.
+    The model takes this for a reset of the odometry, and begins a new path.
     """
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(2.0, 0.0), HALT, 1.0)
@@ -100,7 +100,7 @@ def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
 def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
     """A pose has NaN or infinity.
 
-    The view shows the pose and names the value, but the path omits this pose.
+    The view shows this pose and names the values that are not finite. The path omits the pose.
     """
     model = Model("/omnibot_driver", 0.0)
     for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):

@@ -161,9 +161,9 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A line's buffer is full. The line is not shared with the guard.
+    """A line's buffer is full. The driver must be able to open this line again.
 
-    The guard's lock would prevent the driver from opening this line again.
+    The line is therefore not shared with the guard, whose lock would prevent the new opening.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])

@@ -21,7 +21,8 @@ is implausible."""
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
 WAITED_S: Final = 1.0
-"""Time in s after a stall of the driver in which any delay of a line is plausible."""
+"""Time in s from the first line after a stall of the driver. In this time, any delay of a line is
+plausible."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
@@ -29,9 +30,9 @@ AGREE_S: Final = 0.1
 times in a row. The last must arrive at least ``AGAIN_AFTER_S`` s after the first. Between the first
 and each later one, board time and arrival time must advance equally, within ``AGREE_S`` s."""
 EARLIES_WITHIN_S: Final = 1.0
-"""Time in s. If three lines (``AGAIN``) within this time seem to arrive early, the clock began with
-a late line, and must begin again. The three lines need not come in a row: a line between them may
-seem right, because it is late too."""
+"""Longest time in s in which three lines (``AGAIN``) must seem to arrive early, so that the clock
+begins again. Such lines show that the clock began with a late line. They need not come in a row: a
+line between them may be late too, and then seems right."""
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
 SMALLEST_STEP_S: Final = 1e-6
@@ -61,14 +62,14 @@ class TeensyClock:
         ``_odd``: the first of these times, and when it arrived.
         """
         self._earlies: list[tuple[float, float]] = []
-        """Times that seem early, but are otherwise plausible, each with its arrival."""
+        """Board times that seem early, but are otherwise plausible, each with its arrival time."""
         self._last_s = 0.0
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: none of its lines has waited for the end of an earlier stall.
+        """Begin a new connection, and keep the times of the board.
 
-        The times of the board are kept.
+        The lines of the new connection have not waited for the end of an earlier stall.
         """
         self._stalled, self._waited_until = False, -math.inf
 
@@ -122,7 +123,7 @@ class TeensyClock:
         return True
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
-        """Return whether enough implausible times agree; if they do, begin a new clock."""
+        """Return whether enough implausible times agree with each other; if so, begin anew."""
         if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
             self._odd, self._odds = (board_s, now), 1
             return False
@@ -139,7 +140,7 @@ class TeensyClock:
         return True
 
     def _began_late(self, board_s: float, now: float) -> bool:
-        """Return whether enough early times agree; if they do, begin the clock again.
+        """Return whether enough early times agree with each other; if so, begin anew.
 
         No line can arrive early. If the clock began with a line that had waited for the host, lines
         that have not waited seem early. Without a new beginning, they might be rejected for ever.
@@ -200,12 +201,12 @@ class StampedReadings:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return the timestamps of the added readings.
+        """Return the timestamps of the readings that were added with ``add``.
 
-        If the number of ``readings`` is not that of the added ones, return ``now`` for each.
+        If ``readings`` has another number of readings, return ``now`` for each of them.
         """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the timestamp of the first added reading; ``now`` if there is none."""
+        """Return the timestamp of the first reading that was added; ``now`` if there is none."""
         return self._stamps[0] if self._stamps else now

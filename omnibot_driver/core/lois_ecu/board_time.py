@@ -56,9 +56,9 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Change of the arrival time minus the board's time since the first tick report, in s. The
-        first value is for a clock that always runs. The second value is for a clock that stops
-        while the board sends."""
+        """Change, in s, of a difference since the first tick report. The difference is the arrival
+        time minus the board's time. The first value is for a clock that always runs. The second
+        value is for a clock that stops while the board sends."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),

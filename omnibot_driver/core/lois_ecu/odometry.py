@@ -29,17 +29,17 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""After the last report, the pose is predicted for this number of periods of the tick reports, or
-for ``UNHEARD_S`` s if that time is longer."""
+"""Number of periods of the tick reports for which the pose is predicted after the last report. The
+pose is always predicted for at least ``UNHEARD_S`` s."""
 LOST_REPORTS_S: Final = 1.2
-"""If a silence is shorter than this time in s, and no set-point changed in it, the driver assumes
-that only reports were lost, and that the wheels have followed their set-points."""
+"""Limit in s for the length of a silence. If a silence is shorter and no set-point changed in it,
+the driver assumes that only reports were lost, and that the wheels followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
-"""Largest count, in turns of the wheel, with which a robot at rest can show a restart of the board.
-A larger count may come from a push. A count of one tick is always small enough."""
+"""Largest count, in turns of the wheel, that can show a restart of the board while the robot is at
+rest. A larger count may come from a push. A count of one tick is always small enough."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -57,9 +57,9 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. Until time passes, the wheels'
-        ``blind`` flags are kept: a report that was read together with the ticks of the estimate may
-        still correct the motion before the estimate."""
+        """Whether no time has passed since the last estimate. While this is true, the wheels keep
+        their ``blind`` flags. One read may contain the ticks of the estimate and then an odometry
+        report. The flags allow this report to correct the motion before the estimate."""
         self._may_roll_mps = 0.0, 0.0
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -284,7 +284,7 @@ class LoisOdometry:
         return self.estimates.now(stamp_s, stamp_s - self._at_s, self._may_roll_mps)
 
     def _keep(self, now: float) -> None:
-        """Store the state after a report, for a restart of the board that is noticed later."""
+        """Store the state after a report, in case a restart of the board is noticed later."""
         self._heard_at_s, self._lost_s = now, -math.inf
         left, right = self._motion.wheels
         self._may_roll_mps = (
@@ -309,7 +309,7 @@ class LoisOdometry:
     def _after_silence(self, now: float) -> None:
         """Add the errors of a silence in which the motion is unknown.
 
-        If a Stop was lost in the silence, the wheels rolled on.
+        The wheels may have rolled on, because a Stop may have been lost in the silence.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:

@@ -2,8 +2,8 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-The repetitions follow quickly. Each request restarts the record, so a late repetition would delay
-the record.
+Each request restarts the record, so a late repetition would delay the record. The repetitions
+therefore follow quickly.
 """
 
 import math
@@ -30,9 +30,9 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which a request is sent, since the first one. The intervals are longer than the
-time for which the board may receive nothing, and not multiples of the usual periods of its
-reports."""
+"""Times in s at which a request is sent, counted from its first sending. The intervals are longer
+than the time for which the board may receive nothing. They are not multiples of the usual periods
+of the board's reports."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Unit, in s, of the times in an RPM record. It follows from the unit of the board's clock in its
 tick reports (0x12)."""
@@ -84,10 +84,10 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings, with the result of the request if it is known now.
+        """Return the decoded readings ``found``, with the result of the request if it is known now.
 
-        A record that is not expected is dropped. If there is no reading, but lines of a record are
-        arriving, return RecordComes.
+        A record that is not expected is removed. If ``found`` is then empty while lines of a record
+        are arriving, the result is a RecordComes.
 
         ``prevented``: why the record cannot come, as a sentence. Empty if it can come.
         """

@@ -30,16 +30,16 @@ from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 BEGIN_RADPS: Final = 0.03
 """Standard deviation of the turn rate, in rad/s, before the first heading of a forward drive (RM).
 
-Unequal motors cause this turn.
+Unequal motors cause this turn rate.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
 ACCELERATION_RADPS2: Final = 3.0
 """Standard deviation of the turn's acceleration since the last encoder count, in rad/s²."""
 FRESH_S: Final = 0.2
-"""The measured turn rate is valid while the last reported heading is at most this old, in s."""
+"""Age of the last heading, in s, up to which the measured turn rate is valid."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
-"""Assumptions for the end of a forward drive (RM) after which the heading was not read.
+"""Assumptions about the end of a forward drive (RM) if no heading was read after the stop.
 
 ``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate in rad/s.
 ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
@@ -136,11 +136,11 @@ class Reckoning(CorrectedPose):
         self.stands, self._stood_s = True, now
 
     def rest(self, longest: float = math.inf) -> float:
-        """End the motion, after the distance that the robot coasted was measured too.
+        """End the motion. Called after its last count, so the coasted distance is included.
 
-        After a turn on the spot, the server may have reported an implausible angle. In this case,
-        return the angle that the wheel measured minus the server's angle, in rad. Otherwise
-        return 0.
+        After a turn on the spot, compare the angle that the wheel measured with the angle that the
+        server reported. If the server's angle is implausible, return the wheel's angle minus the
+        server's, in rad. In all other cases, return 0.
 
         ``longest``: longest possible distance of a straight move in m, or turn in rad.
         """
@@ -166,9 +166,10 @@ class Reckoning(CorrectedPose):
         return wrong_rad
 
     def _doubt_unread_turn(self) -> None:
-        """Add the error of the turn since the last heading of a forward drive (RM).
+        """Add the error of an unknown turn to the pose: the turn since the last heading was read.
 
-        Called at the end of a drive if no heading was read after the robot was stopped.
+        Called at the end of a forward drive (RM) if no heading was read after the robot was
+        stopped.
         """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)
@@ -192,10 +193,10 @@ class Reckoning(CorrectedPose):
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add a heading error: the wheel speed ratio changes at a time that is not exactly known.
+        """Add a heading error, because it is not exactly known when the wheel speed ratio changes.
 
-        ``part``: relative change of the ratio. ``late_s``: length in s of the interval in which
-        the change may happen.
+        ``part``: relative change of the ratio. ``late_s``: length in s of the interval in which the
+        change may happen.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -234,10 +235,11 @@ class Reckoning(CorrectedPose):
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """Distance of the right wheel in m, and turn in rad, that the pose may lack.
+        """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        If the counts do not show whether the last motion has begun, the values are those of this
-        motion. Otherwise both are zero.
+        If the start command may be lost, the last count may be from before the start. The pose then
+        does not include this count, and this property has its motion. Otherwise both values are
+        zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -308,10 +310,10 @@ class Reckoning(CorrectedPose):
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return by how many s the last heading is older than FRESH_S, and the resulting error.
+        """Return for how many s the turn rate has been out of date, and the resulting error.
 
-        The error is the heading's standard deviation in rad. Both values are 0 except in a forward
-        drive (RM).
+        The turn rate is out of date if the last heading is older than FRESH_S. The error is the
+        heading's standard deviation in rad. Both values are 0 except in a forward drive (RM).
         """
         stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:
@@ -320,5 +322,8 @@ class Reckoning(CorrectedPose):
 
 
 def _turn_error_rad(seconds: float) -> float:
-    """Return the standard deviation of the turn in this time, predicted from a known turn rate."""
+    """Return the standard deviation, in rad, of a turn that lasts ``seconds``.
+
+    The turn is predicted from the turn rate at its beginning, which is known.
+    """
     return min(math.pi, ACCELERATION_RADPS2 * seconds * seconds / 2)

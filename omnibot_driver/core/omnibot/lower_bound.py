@@ -16,7 +16,8 @@ from omnibot_driver.core.omnibot.frames import INCOMPLETE, NO_FRAME, measure
 
 DAMAGE: Final = ONE_BYTE
 REACH: Final = 15 + 2
-"""Largest number of bytes that one damaged frame covers: the longest frame and two added bytes."""
+"""Largest number of bytes that one damaged frame covers: 15 of the longest frame, and 2 that the
+line has added."""
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]

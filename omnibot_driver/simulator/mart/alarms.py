@@ -149,8 +149,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    The server makes an error, and so does this function: it adds the distance of acceleration and
-    deceleration in feet to the remaining distance in inches.
+    This function reproduces an error of the server. The distance of acceleration and deceleration
+    is in feet, the remaining distance is in inches, and the server adds the two numbers.
     """
     if motion.kind not in _TIMED:
         return 0.0

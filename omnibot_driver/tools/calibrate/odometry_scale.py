@@ -4,7 +4,7 @@
 
 If the driver has the parameter ``metres_per_count``, the tool finds ``metres_per_count``,
 ``linear_scale`` and ``motor_balance``. Otherwise, the tool finds the scales of the odometry. This
-module knows drives and readings; it does not know the base's wheels.
+module knows drives and their measurements; it does not know the base's wheels.
 """
 
 import argparse
@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 LINES: Final = 2
 """Number of straight drives.
 
-With two drives the tool notices a single wrong reading, because the results of the drives differ.
+If the user measures one of two drives wrongly, the tool notices it, because the results of the
+drives differ.
 """
 UNLIKE: Final = 4.0
-"""The tool warns if two ratios differ by more than this number of standard deviations."""
+"""Number of standard deviations. If two ratios differ by more, the tool warns."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s.
@@ -40,9 +41,9 @@ COUNT, UNITS = "metres_per_count", "linear_scale"
 The tool finds ``COUNT``. If ``COUNT`` grows by a factor, the tool divides ``UNITS`` by this factor.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
-"""The balance of the two motors, which the driver measures during the drives.
+"""Name, name in /diagnostics, and standard deviation of the parameter for the motors' balance.
 
-The three values are the parameter's name, the name in /diagnostics, and the standard deviation.
+The driver measures the balance of the two motors during the drives.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark where"
@@ -181,7 +182,8 @@ def result(
         if abs(one.value - other.value) > UNLIKE * math.hypot(one.value_sigma, other.value_sigma):
             notes.append(
                 f"The results of {one.drive.name} and {other.drive.name} differ by"
-                f" {abs(one.value / other.value - 1):.1%}: a reading is wrong, or the robot slips."
+                f" {abs(one.value / other.value - 1):.1%}: one of your measurements is wrong,"
+                " or the robot slips."
             )
     return Result(
         findings=findings,
@@ -192,7 +194,7 @@ def result(
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw, for each drive, the motion that the user measured, divided by that of the odometry."""
+    """Draw, for each drive, the user's measurement divided by the odometry's."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

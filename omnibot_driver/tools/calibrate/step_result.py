@@ -18,10 +18,10 @@ QUANTUM_RADPS: Final = 0.05
 The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 """
 MANY: Final = 1.5
-"""The tool warns if the residuals exceed the quantisation error by more than this factor.
+"""Ratio of the residuals to the quantisation error above which the tool warns.
 
-One possible cause is that commands were delayed. The residuals are then twice as large, and the
-delay that the tool finds for the wheel is 4 ms too long.
+A possible cause of large residuals is that commands were delayed. The residuals are then twice as
+large, and the delay that the tool finds for the wheel is 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.

@@ -49,9 +49,9 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The motion monitor stops the robot, and the user sends a zero command.
+    """The motion monitor has stopped the robot, so motion is refused. A zero command arrives.
 
-    After this command, motion commands are accepted too.
+    The zero command is accepted, and after it motion commands are accepted again.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -61,9 +61,9 @@ def test_a_zero_command_ends_the_refusal() -> None:
 
 
 def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
-    """The motion monitor stops the robot twice within a minute. ~/start ends the refusal.
+    """The motion monitor stops the robot twice within a minute. Only ~/start allows motion again.
 
-    Waiting does not help. Zero commands are still accepted.
+    Waiting does not help. Zero commands are accepted even before ~/start.
     """
     interlock = MotionInterlock()
     interlock.trip(0.0)
@@ -78,7 +78,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The motion monitor stops the robot over a minute after the last stop, or after ~/start.
+    """The motion monitor stops the robot over a minute after its previous stop, or after ~/start.
 
     This stop counts as a first one: motion is allowed again without ~/start.
     """
@@ -95,7 +95,8 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
     """The board has no ~/start. The motion monitor stops the robot a second time within a minute.
 
-    The release of the e-stop ends the refusal. After a first stop, such a release has no effect.
+    The release of the e-stop ends the refusal of motion. After the first stop, a release of the
+    e-stop does not end the refusal.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

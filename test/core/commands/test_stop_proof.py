@@ -95,7 +95,7 @@ def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
 
 
 def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
-    """A displacement within 50 ms after Stop is ignored. It may have ended before Stop arrived."""
+    """A displacement may have ended before Stop arrived, so it is ignored for 50 ms after Stop."""
     for _ in range(10):
         proof.look(moved(), 10.049)
     assert not proof.proved

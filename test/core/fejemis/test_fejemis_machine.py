@@ -20,9 +20,9 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The driver sends a lift voltage with a time limit. Then its lines no longer arrive.
+    """The driver sends a lift voltage with a time limit. Then the front board receives no line.
 
-    The lift stops by itself when this time is over.
+    The lift stops by itself when the time limit is over.
     """
     bench = nominal()
     lift_it(bench)
@@ -69,9 +69,10 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """A lift voltage waits, because another was just sent. Its time limit begins after the wait.
+    """A lift voltage must wait, because another voltage was just sent.
 
-    If the lift is switched off before that, the waiting voltage is discarded.
+    The time limit of the waiting voltage begins when it is sent. If the lift is switched off during
+    the wait, the waiting voltage is discarded.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
@@ -90,10 +91,11 @@ def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
 
 
 def test_a_new_lift_voltage_is_not_cancelled_by_the_repeated_switching_off() -> None:
-    """Lift and brush are switched off. Each of the two lines for this is usually sent three times.
+    """Lift and brush are switched off. Soon after that, a new lift voltage is commanded.
 
-    After the first time, a lift voltage is commanded. The line for the brush is still repeated, but
-    the line for the lift is not.
+    The line that switches the lift off is usually sent three times, and so is the one for the
+    brush. Here, the brush's line is still repeated. The lift's line is not, because it would cancel
+    the new voltage.
     """
     machine = Machine()
     machine.off()

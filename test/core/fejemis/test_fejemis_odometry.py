@@ -145,9 +145,10 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
 
 @pytest.mark.slow
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
-    """In fifty drives, wheels slip and have wrong sizes, as the covariance assumes.
+    """In fifty drives, slip and wheel sizes are wrong by random amounts from the noise settings.
 
-    The normalised squared error (NEES) is about 3 on average.
+    The covariance is computed from the same settings, so the normalised squared error (NEES) is
+    about 3 on average.
     """
     noise = OdometryNoise(wheels=WHEELS)
     squares = []

@@ -53,10 +53,10 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 @pytest.mark.parametrize("closes", [False, True])
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
-    """During a power off, the boards fall silent, and the user calls ~/start.
+    """During a power off, the boards fall silent. Then the user calls ~/start.
 
-    ~/start ends the power off, which fails. The boards have sent nothing, so ~/start is not
-    confirmed. ``closes``: whether the ports then close.
+    The call ends the power off, which is reported as failed. The boards have sent nothing since the
+    call, so ~/start is not confirmed. ``closes``: whether the ports close right after the call.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -159,8 +159,8 @@ def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_ot
 ) -> None:
     """Both boards restart while not connected, and come back at each other's port.
 
-    The driver compares the time of each board with that of the same board before, whichever port it
-    is at. So it notices both restarts, and accepts motion.
+    The driver compares the time of each board with the earlier time of the same board. The port
+    does not matter. So the driver notices both restarts, and accepts motion.
     """
     bench.close()
     bench.speaks = set()

@@ -35,8 +35,9 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
     """The boards restart, and each read brings the lines of up to half a second.
 
-    So one read contains the first lines after a restart. Their stamps differ from the time of this
-    read only by rounding errors. In nanoseconds, they still increase.
+    So one read contains the first lines after a restart. Their stamps are almost equal: they differ
+    from the time of this read only by rounding errors. Rounded to nanoseconds, the stamps must
+    still increase.
     """
     chance = random.Random(seed)
     bench = Bench()

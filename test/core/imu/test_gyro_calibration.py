@@ -160,9 +160,9 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A gap in the readings restarts a calibration. Gaps come until the calibration's time is over.
+    """Each gap in the readings restarts a calibration. Gaps come until its time is over.
 
-    The calibration fails and leaves the bias as it was.
+    The calibration therefore fails. It leaves the bias as it was, and its message names the gaps.
     """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)

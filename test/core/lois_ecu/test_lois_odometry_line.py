@@ -10,9 +10,9 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def test_odometry_before_the_first_ticks_of_a_new_line_leaves_the_covariance_finite() -> None:
-    """After a reconnect, a backward command is sent before the first ticks arrive.
+    """The driver reconnects, and sends a backward command before the first ticks arrive.
 
-    The last tick report is old by then. The covariance stays finite.
+    The last ticks are then old, but the covariance stays finite.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)

@@ -168,9 +168,10 @@ def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
 def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
     firmware: Firmware, lost_way: str
 ) -> None:
-    """The request for a large change of the motors' units is lost, or the reply to it.
+    """A request for a large change of the motors' units gets no answer.
 
-    The measured speeds show which of the two was lost. So the turn rate is soon as commanded.
+    Either the request or the reply is lost. The measured speeds show which one, so the driver
+    corrects the turn rate quickly.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.2, 0.4, 3.0)

@@ -92,9 +92,9 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
 
 
 def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
-    """Four seconds after its command, something slows the first turn by 10 % for 0.6 s.
+    """Something slows the robot's first turn by 10 % for 0.6 s, four seconds after the command.
 
-    A new start of the turn would cost more than this error, so the driver continues the turn.
+    The driver continues the turn, because a new start would cost more than this error.
     """
     bench = MartBench("source", speed_mps_per_unit=MartSettings().speed_per_unit).ready()
     bench.command(0.0, 0.5, 4.0)

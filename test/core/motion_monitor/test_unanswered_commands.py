@@ -58,9 +58,9 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 @pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The line to the board is cut twice, so the robot does not obey. In between, it obeys.
+    """The robot does not obey a command, then it obeys one, and then it does not obey again.
 
-    A notice appears each time.
+    It does not obey while the line to the board is cut. A notice appears in both of these cases.
     """
     bench = standing()
     for hears in (False, True, False):
@@ -75,9 +75,9 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """The user commands 1 mm/s, which is within the noise, and then zero. No notice appears.
+    """The user commands 1 mm/s, and then a zero speed. No notice appears.
 
-    Neither kind of command can show whether a robot obeys.
+    Neither command can show whether the robot obeys: 1 mm/s is within the noise.
     """
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)

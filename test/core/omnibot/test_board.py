@@ -107,11 +107,9 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """Two «Paused» texts come directly one after the other, so the board stayed paused.
+    """A «Paused» text continues an earlier one if no data and at most nine lost texts were between.
 
-    Up to nine texts between them may be lost, but not ten.
-
-    If data comes between them, the board has run in between, and may have restarted.
+    If data or more lost texts were between the two, the board may have run or restarted meanwhile.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]
@@ -165,9 +163,10 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Two reads have seconds of data each, in which SEQ wraps. Three deltas between them are lost.
+    """Three deltas are lost between two reads. Each of the reads has more than 2 s of data.
 
-    Exactly three deltas are counted as lost, and no restart is reported.
+    In the first read, SEQ wraps. Exactly three deltas are counted as lost, and no restart is
+    reported.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
@@ -184,9 +183,9 @@ def test_a_regular_sequence_has_no_losses() -> None:
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """A delta is the first one of a connection or after a pause. It may have any count.
+    """The first delta of a connection, or after a pause, may have any count.
 
-    No delta is counted as lost.
+    No delta before it is counted as lost.
     """
     board = bot()
     assert lost(board, moved(7)) == [0]
@@ -291,7 +290,7 @@ def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
 def test_a_frame_that_waited_comes_out_at_the_end() -> None:
     """A frame ends in FF, which may begin a header. It is held until the next byte comes.
 
-    If the connection ends before, the frame is returned.
+    If the connection ends before the next byte, the frame is returned.
     """
     board = bot()
     board.receive(encode(REST) * 2, 0.0)

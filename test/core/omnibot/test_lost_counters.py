@@ -25,9 +25,9 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 @cache
 def over_a_gap(lost: int, seed: int, frame: str) -> tuple[Line, list[OdometryEstimate]]:
-    """Return a line 1 s after a gap, and its estimates since the gap began.
+    """Return a simulated line that has run for 1 s since a gap, and its odometry estimates.
 
-    The first of these estimates is the last one before the gap.
+    The first estimate is the last one before the gap. The others are from the 1 s after the gap.
     """
     on = line(seed, frame=frame)
     before = on.estimates[-1]
@@ -176,8 +176,8 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
     """Deltas are lost, and a pose arrives before the next delta.
 
-    The pose shows the motion of the lost deltas, and the next delta shows that they are lost. Their
-    motion is added only once.
+    The pose already includes the motion of the lost deltas. Only the next delta shows that deltas
+    were lost. Their motion is nevertheless added only once.
     """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)
