@@ -28,8 +28,9 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s.
 
-The reader thread may itself wait for the guard process: 2.5 s, until it kills a guard that hangs.
-Only a guard in an uninterruptible sleep takes longer."""
+The reader thread may itself wait for the guard process. After 2.5 s, the reader
+kills a guard that hangs. Only a guard in an uninterruptible sleep takes longer.
+"""
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
 driver waits longer."""

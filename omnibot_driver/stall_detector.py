@@ -16,7 +16,8 @@ stalled. It is a little shorter than the time after which the guard process stop
 the driver notices each stall in which the guard stops the robot."""
 SETTLE_S: Final = 0.25
 """Time in s for which commands are still refused after the end of a stall. The sender's clock is
-known only roughly, so a command from this time may have been sent during the stall."""
+known only roughly, so a command that seems to be from this time may have been sent during the
+stall."""
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
 A command that seems to be older comes from a sender whose clock is wrong."""

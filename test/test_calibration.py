@@ -69,7 +69,7 @@ def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
 
 
 def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
-    """The file's path is that of a folder. The error says that it cannot be read."""
+    """The calibration file cannot be read, because its path leads to a folder. An error says so."""
     with pytest.raises(ParameterError, match=r"cannot be read \(Is a directory\): correct the"):
         calibration.load(tmp_path, PARAMETERS)
 

@@ -145,9 +145,9 @@ json_like = st.recursive(
 def test_any_value_is_either_taken_in_the_right_type_or_refused(
     parameter: Parameter, value: object
 ) -> None:
-    """A check accepts a value or raises ParameterError.
+    """For any value, a check returns a value of the right type, or raises ParameterError.
 
-    It also accepts each value that it has returned.
+    The check also accepts each value that it has returned.
     """
     try:
         taken = parameter.check(value)

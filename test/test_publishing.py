@@ -251,9 +251,10 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In one read, the board reports a pause, then sends data. Another thread publishes "paused".
+    """One read contains a report of a pause, and then data.
 
-    After the read, the driver publishes "nominal". Otherwise, later subscribers would get "paused".
+    In the middle of this read, another thread publishes the state "paused". So after the read, the
+    driver publishes "nominal". Otherwise, later subscribers would get "paused".
     """
     session, publishing = session_with(node)
     published: list[str] = []

@@ -20,7 +20,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Mode(Enum):
-    """The mode of a board, as shown by its data. Each value is the mode's public name."""
+    """The mode of a board, which its data shows. Each value is the mode's public name."""
 
     UNKNOWN = "connecting"
     PAUSED = "paused"
@@ -108,7 +108,7 @@ class Board(Protocol):
 
     @property
     def mode(self) -> Mode:
-        """Mode of the board, as inferred from its data."""
+        """Mode of the board, inferred from its data."""
 
     @property
     def edge(self) -> SampleBoundary | None:

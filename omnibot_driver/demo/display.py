@@ -87,7 +87,7 @@ class Drive:
     """The results of a drive.
 
     ``way_m``: distance driven. ``laps``: number of driven laps of the square.
-    ``pose``, ``true_pose``: the robot's pose at the end, by odometry and as simulated.
+    ``pose``, ``true_pose``: the robot's pose at the end: by odometry, and in the simulation.
     ``points``: the driven path, as x and y in m.
     ``page``: path of the document about the board, which the last text of the demo names.
     ``real``: arguments after ``--ros-args`` with which the driver is started for a real robot.

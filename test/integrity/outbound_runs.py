@@ -75,7 +75,7 @@ def one(
 ) -> tuple[Scores, int]:
     """Run one script with each fault on all boards.
 
-    Return the scores, and the number of runs of the session.
+    Return the scores, and how often the driver's session ran.
 
     ``share``: share of the usual number of trials. ``job``: name and seed of the scene.
     """
@@ -117,7 +117,7 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 
 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
-    """Run all trials on all processors. Return the scores, and the number of runs of the session.
+    """Run all trials on all processors. Return the scores, and how often the driver's session ran.
 
     ``share``: share of the usual number of trials. ``scripts``: number of scripts for each scene.
     """

@@ -82,7 +82,7 @@ class FejemisBoard(Board):
 
     @property
     def geometry(self) -> Geometry:
-        """Track and wheelbase in m, as the drive board uses them.
+        """Track and wheelbase in m that the drive board uses.
 
         Until the board has reported them, they come from the settings.
         """

@@ -2,7 +2,8 @@
 
 """The messages that the two boards send: one class for each kind of line.
 
-Units are the boards': m, m/s, m/s², s, µT, V, A, and degrees or rad as each class says.
+Units are the boards': m, m/s, m/s², s, µT, V, A, and degrees or rad. Each class says which of these
+two it uses.
 """
 
 from dataclasses import dataclass

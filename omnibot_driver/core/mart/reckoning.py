@@ -49,7 +49,8 @@ ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
 class Reckoning(CorrectedPose):
     """Dead reckoning by the encoder count and the relative heading.
 
-    ``motion``: the motion to which new encoder counts belong; Motion.NONE after its last count.
+    ``motion``: the motion to which new encoder counts belong. After the last count of a motion, it
+    is Motion.NONE.
 
     ``stands``: whether the robot was stopped; it may still coast.
 

@@ -60,7 +60,7 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return, for each possible start of a frame, the end of the row of undamaged frames there.
+    """Return, for each possible start of a frame, the end of the row of undamaged frames from it.
 
     Keys and values are positions in ``data``. The keys are in descending order.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Supervision of a motion in progress, 100 times a second, as the server does it.
+"""Supervision of a motion in progress, 100 times a second. It works like that of the real server.
 
 It detects that the robot starts, stops or comes near an obstacle, and it ends controlled moves.
 This module knows motions; it does not know commands.

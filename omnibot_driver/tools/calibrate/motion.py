@@ -36,9 +36,10 @@ OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Speeds below which the tool does not check that the robot moves, because of friction.
+"""Speeds below which the tool does not check that the robot moves.
 
-For ``cmd_vel``: a linear speed in m/s and a yaw rate in rad/s. For ``wheel_cmd``: rad/s.
+Friction may prevent such slow motions. For ``cmd_vel``: a linear speed in m/s and a yaw rate in
+rad/s. For ``wheel_cmd``: rad/s.
 """
 
 

@@ -67,7 +67,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The motion in one drive, in m or rad, as measured by the user and by the odometry.
+    """The motion in one drive, in m or rad, measured by the user and by the odometry.
 
     ``told``: motion that the odometry measured.
 
@@ -157,7 +157,7 @@ def result(
 
     ``now``: the driver's parameters before the calibration.
 
-    ``balance``: the motors' balance as the driver measured it, or None.
+    ``balance``: the motors' balance that the driver measured, or None.
     """
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))

@@ -153,7 +153,8 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
     """Return the predicted traits of a step, for several starting positions of the wheel.
 
-    The result has the largest overshoot, the longest settling time and the mean error.
+    The result has the largest overshoot, the longest settling time and the mean error of all
+    starting positions.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)

@@ -166,7 +166,7 @@ def spectra(log: Log) -> Figure:
 def timing(log: Log) -> Figure:
     """Draw how evenly messages are timed: the steps between timestamps, and the delays of arrival.
 
-    The median step and the smallest delay are subtracted.
+    The median step is subtracted from the steps, and the smallest delay from the delays.
     """
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")

@@ -120,7 +120,10 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """Rest is proved. Then a displacement is too large for a robot at rest, and ends the proof."""
+    """Rest is proved. Then a displacement arrives that is too large for a robot at rest.
+
+    This displacement ends the proof.
+    """
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved

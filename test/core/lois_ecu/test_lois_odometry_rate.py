@@ -23,7 +23,7 @@ def published(board: LoisEcuBoard, now: float) -> bool:
 def test_odometry_that_is_late_is_not_published_twice_at_once(
     firmware: str, delay_s: float
 ) -> None:
-    """Odometry is published late. The next odometry follows a period later, not at once."""
+    """Odometry is published late. The next odometry is published one period later, not at once."""
     bench = Bench(firmware)
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -37,7 +37,7 @@ def test_odometry_that_is_late_is_not_published_twice_at_once(
 
 @FIRMWARE
 def test_the_first_odometry_is_published_once(firmware: str) -> None:
-    """The first odometry is published once. The second one follows a period later."""
+    """The first odometry is published once. The second one is published one period later."""
     lois = LoisRobot(firmware)
     board, now, times = LoisEcuBoard(LoisEcuSettings()), 1000.0, []
     board.connect()

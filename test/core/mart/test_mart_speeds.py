@@ -200,7 +200,7 @@ def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units:
 
 
 def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
-    """The sender ramps a turn up. At the first, low rates the motors do not turn.
+    """The sender slowly raises the rate of a turn. At the first rates, the motors do not turn.
 
     The driver reports no fault.
     """
