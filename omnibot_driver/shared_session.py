@@ -60,8 +60,8 @@ class SharedSession:
         self.told = False
         """Whether the link wrote its last Stop to every line.
 
-        If the port is lost when the link ends, the reader opens it again and writes Stop. ``told``
-        then becomes True only if the robot may still have been moving (``Shutdown.owed``).
+        If the port is lost when the link ends, the reader opens it again and writes Stop. In this
+        case, ``told`` stays False if a standstill had been proved (``Shutdown.owed`` is False).
         """
         self.stood = False
         """Whether Stop was sent and measurements showed the robot at rest when the link ended."""
@@ -97,14 +97,14 @@ class SharedSession:
     ) -> None:
         """Call ``action`` with the session and ``wish``, the motion that a sender wants.
 
-        * ``sent_ns``: possible times of sending, as time of day in ns. There are two while the
-          sender's clock is not known well.
+        * ``sent_ns``: possible times at which the command was sent, as time of day in ns. While the
+          sender's clock is not known well, there are two possible times.
         * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
           the motion interlock must know that the sender is still active.
 
         Raises CommandRefused if ``action`` refuses, or if the command was sent while this process
-        was stalled. The function ``refused`` also receives the reason, unless too many events wait
-        for delivery.
+        was stalled. The function ``refused`` also receives the reason; but if too many events wait
+        for delivery, it is not called.
         """
         try:
             with self.lock:

@@ -52,7 +52,10 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 
 
 def at_rest(terminal: Terminal) -> tuple[Link, Session]:
-    """Return a link that has opened this port, and its session. The link has nothing to write."""
+    """Return a link and its session.
+
+    The link has opened the port of ``terminal``, and has nothing to write.
+    """
     ours = session(run=False)
     link = link_to(terminal.path, Listener(), ours)
     link.start()

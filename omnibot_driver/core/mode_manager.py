@@ -29,10 +29,11 @@ data.
 Of a longer interval, only ``FLOWING_S`` is added. A running board sends every 10 ms.
 """
 IN_FLIGHT_S: Final = 0.1
-"""Longest time, in s, that a command, or a notice of a paused board, takes to arrive.
+"""Longest time, in s, that a command takes to the board, or a message of the board to the driver.
 
-A notice that comes within this time after a command may be older than the command, so it proves
-nothing. A notice also proves nothing if data arrive within this time after the notice.
+A paused board sends a notice every second. If a notice comes within this time after a command, the
+board may have sent it before it received the command. Such a notice proves nothing. If data arrive
+within this time after a notice, the board may run, so the notice proves nothing either.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -71,7 +72,7 @@ class ModeManager:
     """The mode that was requested from a board, and the exchange with the board to reach it.
 
     * ``run``: whether to start the board at each connection. If False, the board keeps its mode.
-    * ``answers``: answers to requests that the session has not taken yet.
+    * ``answers``: the answers that the session has not taken yet.
     """
 
     def __init__(self, board: Board, *, run: bool) -> None:
@@ -86,7 +87,10 @@ class ModeManager:
         self._flowed_s = 0.0
         self._paused_with_p = self._was_running = self._may_have_restarted = False
         self._mode_known = False
-        """Whether the mode was known at the last reset, so that a notice can show a restart."""
+        """Whether the board's mode was known when the last reset was sent.
+
+        If it was not known, a notice of a paused board does not show that the board has restarted.
+        """
         self._shown_at = math.inf
         self._request: Request | None = None
         self._token: object = None
@@ -211,7 +215,10 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether no request is open, so that data from a running board has no effect here."""
+        """Whether data from a running board has no effect here.
+
+        This is the case if no request is open and the board is not to be paused.
+        """
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:
@@ -240,7 +247,10 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Confirm a pause, repeat a start that is due, or fail the request that is overdue."""
+        """Do what is due at ``now``.
+
+        A pause is confirmed, a start is sent again, or a request that has taken too long fails.
+        """
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
         elif now >= self._deadline:

@@ -60,8 +60,11 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""Functions by the name of a common parameter. Each returns whether a board with given traits has
-the parameter. Common parameters without a function do not depend on the traits."""
+"""For some common parameters, the function that decides whether a board has the parameter.
+
+The function's argument is the traits of the board. A common parameter that is not in this table
+does not depend on the traits.
+"""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

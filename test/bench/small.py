@@ -21,7 +21,10 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core that are measured in turn. Driver and floor get one such share each."""
+"""Shares of one core that are measured one after the other.
+
+The driver gets such a share, and so does the floor, the smallest program with the same output.
+"""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""

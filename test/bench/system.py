@@ -41,10 +41,10 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios of driver to floor, for each adapter. None: unlimited.
+"""Largest allowed ratios, for each adapter: value of the driver divided by value of the floor.
 
-The ratios are those of the median and the 99th percentile of the latency, of the processor time,
-and of the latency of cmd_vel.
+The four ratios are: median latency, 99th percentile of the latency, processor time, and latency of
+cmd_vel. None: unlimited.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -263,7 +263,7 @@ def latencies(
 ) -> list[tuple[float, float]]:
     """Return for each message the time of its frame's delivery, in s, and its latency, in µs.
 
-    ``unit``: value in the message for the number 1 in the frame.
+    ``unit``: value in the message that corresponds to 1 in the frame.
     """
     found = []
     for at, value in heard:

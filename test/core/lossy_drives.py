@@ -42,7 +42,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Return, for each estimate but the first, the time and the motion since the one before."""
+    """Return the time in s and the motion between each estimate and the next one."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)

@@ -23,7 +23,8 @@ Chunker = Callable[[list[Byte], random.Random], Iterator[Read]]
 class Board:
     """A simulated stream of frames from a board.
 
-    ``skew``: relative error of the board's tick by the host's clock; positive if it is too long.
+    ``skew``: relative error of the tick's duration, measured by the host's clock; positive if the
+    tick is too long.
 
     ``loss``: fraction of the frames that are lost.
     """

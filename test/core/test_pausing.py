@@ -37,9 +37,10 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """The user requests a pause of a paused board. The driver sends no P, which would resume it.
+    """The user requests a pause of a paused board. The driver sends no P.
 
-    The driver confirms the request when a new «Paused» text of the board arrives.
+    A P would resume the board. The driver confirms the request when a new «Paused» text of the
+    board arrives.
     """
     bench.ask(Request.PAUSE, 5.0)
     start, asked_at = len(bench.written), bench.now

@@ -152,7 +152,8 @@ def value_of(event: Event) -> str | None:
 def score(truth: list[Event], found: list[Event]) -> Score:
     """Compare published values with the true ones.
 
-    If a value is published more often than in the truth, the additional ones are wrong.
+    A value may be published more often in ``found`` than in ``truth``. The additional publications
+    are regarded as wrong.
     """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))

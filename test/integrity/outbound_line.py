@@ -17,7 +17,7 @@ Arrival = tuple[int, float, int]
 """A byte that arrives: its value, its position in the write, and its origin.
 
 The origin of a byte that the driver wrote is its position. Otherwise, the origin is ``ADDED`` or
-``CHANGED``. The position of an added byte is between those of two bytes of the write.
+``CHANGED``. The position of an added byte is a number between the positions of two written bytes.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 
@@ -26,8 +26,8 @@ class Line(Protocol):
     """The damaged line of one trial.
 
     ``whole``: number of bytes before the next fault. A write of at most this length arrives
-    undamaged, and the caller only subtracts the write's length from ``whole``. For a longer write,
-    the caller must call ``carry``.
+    undamaged. The caller then need not call ``carry``, but subtracts the write's length from
+    ``whole``. For a longer write, the caller must call ``carry``.
     """
 
     whole: int

@@ -15,9 +15,10 @@ SCENARIOS = pytest.mark.parametrize(
 @pytest.mark.parametrize("line", PROMPT)
 @SCENARIOS
 def test_lost_bytes_shift_no_stamps(line: str, scenario: str, skew: float) -> None:
-    """One byte in 1000 is lost. The stamps stay even within 0.2 ms (RMS).
+    """One byte in 1000 is lost. The intervals between stamps stay even, within 0.2 ms (RMS).
 
-    99 % are right within 0.5 ms. The first 2 s and a constant offset do not count.
+    99 % of the stamps are right within 0.5 ms. The first 2 s are not tested, and a constant offset
+    is not regarded as an error.
     """
     stamped = stamp(line, scenario, 1e-3, skew, 0, 10.0)
     assert stamped.unevenness() < 0.2e-3

@@ -63,10 +63,10 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * ``is_zero``: as an attribute, whether the order makes the robot stand still. As an argument,
-      the function that returns this; it may raise CommandRefused.
-    * ``before``: the previous set-point. If it is a body velocity, the ramp starts at the velocity
-      that its own ramp has reached, otherwise at rest.
+    * The attribute ``is_zero``: whether the order makes the robot stand still.
+    * The argument ``is_zero``: function that returns this for an order, or raises CommandRefused.
+    * ``before``: the previous set-point. If that is a body velocity, the new ramp starts at the
+      velocity that the previous ramp has reached. Otherwise, the new ramp starts at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 
@@ -115,8 +115,8 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    * ``is_zero``: as an attribute, whether the order makes the robot stand still. As an argument,
-      the function that returns this; it may raise CommandRefused.
+    * The attribute ``is_zero``: whether the order makes the robot stand still.
+    * The argument ``is_zero``: function that returns this for an order, or raises CommandRefused.
     """
 
     settled: Final = True

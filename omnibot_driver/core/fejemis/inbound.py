@@ -26,7 +26,8 @@ new fault is found: the wheel does not follow its commanded angle."""
 class Inbound:
     """Handler of all messages.
 
-    ``mode``: nominal while both boards send data and the drive board obeys.
+    ``mode``: the mode of the robot. It is nominal while both boards send data and the drive board
+    obeys.
 
     ``relay_rad``: angle of the front wheel that must still be relayed to the drive board, or None.
     """

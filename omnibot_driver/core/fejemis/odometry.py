@@ -15,8 +15,10 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects,
-if rounding of the pose can explain the difference."""
+"""Fraction by which one displacement corrects the wheels' motion towards a pose.
+
+The correction is this small only if rounding of the pose can explain the difference.
+"""
 ROUNDINGS: Final = 1.5
 """Largest difference that rounding of the poses explains, in units of their last digit. Each of two
 poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
@@ -34,8 +36,10 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""If this number of rejected poses in a row agree, each with the rejected pose just before it, the
-board has begun a new coordinate frame."""
+"""Number of rejected poses in a row that prove that the board has begun a new coordinate frame.
+
+Each of them must agree with the rejected pose just before it.
+"""
 
 
 class PoseOdometry:
@@ -61,7 +65,7 @@ class PoseOdometry:
         """
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """How many rejected poses in a row agreed, each with the rejected pose just before it."""
+        """How many rejected poses in a row agree with the rejected pose just before them."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
@@ -86,8 +90,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement up to ``pose``; every 0.2 s, return also a PoseReading.
 
-        The PoseReading contains the sum of all displacements, even of those that the driver rejects
-        later.
+        The PoseReading contains the sum of all displacements. The driver may later reject some of
+        these displacements; the sum includes them nevertheless.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

@@ -64,7 +64,10 @@ class Ports:
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """Return the half that has the ``role``. Return None if neither or both have it."""
+        """Return the board that has the ``role``.
+
+        Return None if no board or each of the two boards has it.
+        """
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first
@@ -75,7 +78,10 @@ class Ports:
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
-        """Find the order of the ports after a heartbeat; return whether the order has changed."""
+        """Find out which board is at which port. Called after a heartbeat.
+
+        Return whether the known order of the boards has changed.
+        """
         first, second = (half.role for half in self.halves)
         if first == second:
             return False

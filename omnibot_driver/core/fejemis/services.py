@@ -18,7 +18,7 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""Time in s between the stop of a moving robot and the loading of a configuration."""
+"""Time in s that a moving robot gets to stop before a configuration is loaded."""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 

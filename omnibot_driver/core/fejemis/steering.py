@@ -27,9 +27,12 @@ turn on the spot may begin. Other motion has full speed up to the same deviation
 ``STILL_ALIGNED_RAD``: largest deviation at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad. The error of the body's velocity that
-this deviation causes at full speed is the largest accepted error. At a larger deviation, the speed
-is limited so that the error does not become larger."""
+"""Largest deviation of the front wheel from its target angle, in rad, at which the robot may drive
+at full speed.
+
+At full speed, this deviation causes a certain error of the body's velocity. If the deviation is
+larger, the speed is limited so that the error does not become larger than that.
+"""
 
 
 @value(frozen=True, slots=True)

@@ -2,8 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-A notice that stops the robot is always passed on, but its text is empty if the same text was shown
-in the last 10 s.
+Some notices make the driver stop the robot. Such a notice is always passed on. Its text is empty if
+the same text was shown in the last 10 s.
 """
 
 import math
@@ -26,11 +26,14 @@ class Told:
         self._told_at: dict[str, float] = {}
 
     def halt(self, text: str, now: float) -> None:
-        """Add a notice that stops the robot; ``text`` gives the reason."""
+        """Add a notice that makes the driver stop the robot; ``text`` gives the reason."""
         self.notices.append(NoticeReading(self._news(text, now), halt=True))
 
     def tell(self, text: str, now: float) -> None:
-        """Add a notice that does not stop the robot."""
+        """Add a notice with this text, unless the same text was shown in the last 10 s.
+
+        The notice does not make the driver stop the robot.
+        """
         if text := self._news(text, now):
             self.notices.append(NoticeReading(text, halt=False))
 

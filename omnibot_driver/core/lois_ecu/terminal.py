@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes of the terminal mode, and the standstill that is needed before a change of any mode.
+"""Changes of the terminal mode. Before a change of any mode, the robot must stand still.
 
 In a terminal mode, the board passes on the lines of a sensor. It then reports neither motion nor
 its e-stop button.
 
-This module works on modes and times.
+This module knows modes and times; it does not know how commands are sent.
 """
 
 import math
@@ -23,9 +23,10 @@ STILL_TALKS_S: Final = 0.3
 
 
 class ModeChange:
-    """Changes of the terminal mode. ``want`` and ``stop_first`` may be called at any time.
+    """Brings the board into the requested terminal mode, ``wanted``.
 
-    ``wanted``: the requested mode.
+    It stops the robot before a sensor's mode, and before the changes passed to ``stop_first``.
+    ``want`` and ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:
@@ -38,7 +39,7 @@ class ModeChange:
         """Changes that wait until the robot has been stopped: new values of parameters, by name."""
         self._stopping_since_s: float | None = None
         self.left = False
-        """Whether a terminal mode has ended. The code that reads this attribute clears it."""
+        """Whether the board has left a terminal mode. The code that reads this value clears it."""
 
     def connect(self) -> None:
         """Begin a new connection. The board may be in any mode."""
@@ -142,7 +143,7 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """Record that the board sent a message of its own, so that it is in no terminal mode."""
+        """Record a message of the board's own, which shows that no terminal mode is active."""
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:

@@ -2,7 +2,7 @@
 
 """Translation of a LOIS ECU's reports to readings in SI units.
 
-This module also detects a restart of the board. It works on reports, without lines.
+This module also detects a restart of the board. Its input is decoded reports, not lines of text.
 """
 
 import math
@@ -46,18 +46,26 @@ RESTARTED_TURNS_PER_S: Final = 1.0
 RESTARTED_TURNS_PER_S * duration`` turns, and ``RESTARTED_TICKS`` ticks more. If a count falls
 further, the board has restarted."""
 SILENT_S: Final = 1.0
-"""Time in s without tick reports. After a longer silence, counts near zero and an irregular clock
-show a restart, even if the wheels may have rolled back to these counts."""
+"""Longest time in s without tick reports for which rolled-back wheels can explain the counts.
+
+If counts are near zero and the clock is irregular, the board may have restarted, or the wheels may
+have rolled back to these counts. After a longer silence, the driver then assumes a restart.
+"""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels are assumed to have rolled back since the last tick report, if
-the unit of the board's clock has just become unknown. Without the unit, the clock cannot confirm
-how long ago that report came."""
+"""Limit, in s, of the time since the last tick report, for the detection of a restart.
+
+The detection uses this time to compute how far the wheels may have rolled back. The limit applies
+only if the unit of the board's clock has just become unknown, because the clock then cannot confirm
+the time.
+"""
 IN_FLIGHT_S: Final = 0.5
-"""Time in s that begins when the first counts are read after a reset. In this time, counts may
-still be from before the reset: the board sent them before it received the reset, or they were read
-late."""
+"""Time in s after a reset for which counts may still be from before the reset.
+
+The time begins when the first counts after the reset are read. The board may have sent counts
+before it received the reset, or the driver may have read them late.
+"""
 
 
 class Translation:
@@ -183,11 +191,11 @@ class Translation:
         return []
 
     def _was_reset(self, ticks: Ticks, read_s: float) -> bool:
-        """Return whether the board may have obeyed a reset since the last ticks.
+        """Return whether the board may have obeyed a reset since the last report of ticks.
 
-        This is so if a count is nearer to zero than before.
+        The result is True if a reset was sent and a count is nearer to zero than before.
 
-        ``read_s``: time of the read, which is not corrected for a late read.
+        ``read_s``: time in s at which the report was read, even if it was read late.
         """
         before, until_s = self._ticks, self._reset_until_s
         if until_s is None:
@@ -234,9 +242,10 @@ class Translation:
         """Return how long ago the board's clock began at zero, in s. None if unknown.
 
         The clock begins at zero when the board starts. A clock in ns also begins at zero every
-        4.3 s, so its age is known only if the clock began after the last tick report.
+        4.3 s. Its age is known only if it began at zero after the last tick report, and this report
+        is less than 4.3 s old.
 
-        ``duration_s``: time since that report.
+        ``duration_s``: time in s since the last tick report.
         """
         if self._unit is None:
             return None

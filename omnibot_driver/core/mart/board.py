@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller as a ``Board`` of the driver. The pilot decides what is sent.
+"""The MART controller as a ``Board`` of the driver. A ``Pilot`` decides what is sent.
 
 The controller sends only replies to commands. It is silent during a controlled move.
 """
@@ -153,9 +153,10 @@ class MartBoard(Board):
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that are due without a datagram, such as odometry or a job's result.
+        """Return the readings that are due even if no datagram arrives.
 
-        While the server is expected to be silent, NOTHING_MEASURED is regularly among them.
+        Examples are odometry, and the result of a job. While the driver expects the server to be
+        silent, a reading NOTHING_MEASURED is due every 0.2 s (``EXPECTED_EVERY_S``).
         """
         readings = self._pilot.take()
         pilot = self._pilot
@@ -223,7 +224,7 @@ class MartBoard(Board):
 
     @property
     def resting(self) -> bool:
-        """Whether the server is free, and measurements show that the robot is at rest."""
+        """Whether the server is not busy, and measurements show that the robot is at rest."""
         return self._pilot.state is State.STILL and self._pilot.proof.proved
 
     @property

@@ -15,7 +15,10 @@ MOST_DEAD: Final = 20.0
 SLOPE_SD, OFFSET_SD = 0.3, 4.0
 """Initial standard deviations of the slope (around 1) and of the offset (around 0 units)."""
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
-"""Standard deviations of the change of slope and offset (units) between two measurements."""
+"""Standard deviations of how much slope and offset change between two measurements.
+
+The offset is in nominal units.
+"""
 SURE: Final = 3.0
 """A motor certainly turns if its expected speed is more than this number of standard deviations."""
 NOISE, NOISE_PART = 0.3, 0.02
@@ -37,7 +40,7 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Improve the line by a ``speed`` that was measured while the motor had ``units``.
+        """Improve the learned line by a ``speed`` that was measured while the motor had ``units``.
 
         ``speed``: in nominal units.
 
@@ -74,9 +77,9 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Add these changes to the slope and the offset of the line.
+        """Add ``slope`` and ``offset`` to the slope and the offset of the line.
 
-        The other motor's line has just changed by the same amounts.
+        Called if only the other motor was measured: both lines then change by the same amounts.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

@@ -15,23 +15,26 @@ from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
-"""Largest plausible acceleration (rad/s²), and change of the turn rate (rad/s), of a robot."""
-OLD_RAD: Final = 0.01
-"""Largest difference in rad at which the first heading in a forward drive (RM) may be an old one.
+"""``ACCELERATION_RADPS2``: largest plausible angular acceleration of a robot, in rad/s².
 
-RM sets the heading to zero. If the first heading in RM is nearly the last one before RM, it may be
-a late reply.
+``MOST_RADPS``: largest plausible change of its turn rate, in rad/s.
+"""
+OLD_RAD: Final = 0.01
+"""Largest difference in rad between two headings that are regarded as the same heading.
+
+A forward drive (RM) sets the heading to zero. If the first heading in RM is nearly the last heading
+before RM, it may have been measured before RM, and its reply may be late.
 """
 MOST_RAD: Final = 1e7
-"""A reported heading of this size in rad or more is rejected.
+"""Size in rad from which a reported heading is rejected.
 
 After its clock was set back, the server may report 1e15 degrees, for example. It integrates the
 turn rate over unsigned milliseconds, and a negative time becomes huge.
 """
 AHEAD_S: Final = 0.3
-"""Longest time in s for which the heading is extrapolated, from its last report to a count."""
+"""Longest time in s for which the heading is predicted after its last report."""
 ODD_TIMES: Final = 3
-"""After this number of implausible headings in a row, the last of them is accepted."""
+"""Number of implausible headings in a row after which the last of them is accepted."""
 SPREADS: Final = 4
 """Averaging time of the turn rate, as a multiple of a reply's time uncertainty."""
 
@@ -41,7 +44,8 @@ class RelativeHeading:
 
     ``told_s``: time of the last accepted heading.
 
-    ``from_s``: earliest possible time of the last heading that certainly answers its query, RMRA.
+    ``from_s``: earliest time at which the server may have measured a heading. This heading is the
+    last one that certainly answers its own query (RMRA), not an earlier query.
 
     ``changed_s``: time of the last change of heading.
 
@@ -56,7 +60,7 @@ class RelativeHeading:
         self._turned_rad = 0.0
         self.same = 0
         self.may_begin_anew = False
-        """Whether the next heading may be the zero of a server that was restarted."""
+        """Whether the next heading may be zero because the server has restarted."""
         self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 
@@ -85,7 +89,7 @@ class RelativeHeading:
     def begin(self, now: float, *, anew: bool) -> None:
         """Record that a motion was started.
 
-        ``anew``: whether the motion is a forward drive (RM), which sets the heading to zero.
+        ``anew``: whether the motion sets the heading to zero, as only a forward drive (RM) does.
         """
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
@@ -143,7 +147,7 @@ class RelativeHeading:
         return bool(turn_rad)
 
     def begins_anew(self, angle_rad: float) -> bool:
-        """Return whether a reported heading is the zero of a restarted server, not a turn."""
+        """Return whether a heading is zero because the server has restarted, not by a turn."""
         known = self._angle_rad is not None and abs(self._angle_rad) > OLD_RAD
         return self.may_begin_anew and angle_rad == 0.0 and known
 

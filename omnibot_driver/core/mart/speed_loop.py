@@ -44,9 +44,12 @@ LEARN_TRIPS, LESS_PER_S = 4, 10.0
 ``LESS_PER_S``: relative growth of a speed's standard deviation, per second that an exchange takes.
 """
 SLOWEST_MPS: Final = 0.015
-"""A wheel whose measured speed in m/s is above this is regarded as turning."""
+"""Measured wheel speed in m/s above which a wheel is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
-"""Least wheel speed in m/s at the start of RM (forward): the server must notice the motion."""
+"""Least wheel speed in m/s at the start of RM (forward).
+
+At a lower speed, the server might not notice the motion.
+"""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the units of the next RM (forward) grow after a start that turned no motor.
@@ -55,7 +58,7 @@ The new units are at most MOST_DEAD, unless RM needs more for the commanded spee
 """
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""The heading error is not integrated for this time in s after a new commanded turn rate."""
+"""Time in s after a new commanded turn rate for which the heading error is not integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units.
@@ -74,7 +77,8 @@ Both factors are large, because a wrong ratio lasts for the whole motion.
 class _Side:
     """One motor, and the wheel that it turns.
 
-    ``stood_s``: time in s without motion, although the units suffice.
+    ``stood_s``: time in s for which the wheel has not turned, although the motor has enough units
+    to turn it.
 
     ``window_units_s``, ``window_m``: sum of units * seconds, and distance in m, in the averaging
     window.
@@ -157,7 +161,10 @@ class SpeedLoop(Motors):
 
     @property
     def blocked_s(self) -> float:
-        """Longest time in s for which a wheel has not turned although its units suffice."""
+        """Time in s for which a wheel has not turned although its motor has enough units.
+
+        Of the times of both wheels, the longer one.
+        """
         return max(self._right.stood_s, self._left.stood_s)
 
     @property
@@ -291,7 +298,7 @@ class SpeedLoop(Motors):
         return (right, left) if right or left else None
 
     def changed(self, right: int, left: int, now: float) -> None:
-        """Record that a change was sent. The motors are assumed to obey it."""
+        """Record that a change of the motors' units was sent. The motors are assumed to obey it."""
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
         self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
         before = self._right.units, self._left.units
@@ -302,13 +309,16 @@ class SpeedLoop(Motors):
             self._clear(now + SETTLE_S)
 
     def missed(self) -> None:
-        """Add uncertainty, because the last change was not answered and may not have arrived."""
+        """Record that the server did not answer the last change of the units.
+
+        The change may not have arrived, so the wheel speed ratio is less certain.
+        """
         self._unsure += MISSED * self.part**2
         self._missed = [*self._missed, self._change][-MOST_MISSED:]
 
     @property
     def _is_slow(self) -> bool:
-        """Whether the network is so slow that a change may come twice."""
+        """Whether the network is so slow that a change of the units may arrive twice."""
         return self.trip_s > SLOW_TRIP_S
 
     def _clear(self, from_s: float) -> None:

@@ -18,7 +18,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 STRETCH: Final = 1.2
 """Largest allowed ratio of speed to set-point.
 
-Users measure the board's scales by hand, and controllers overshoot.
+The ratio is above 1, because controllers overshoot, and users measure the board's scales by hand.
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
@@ -40,8 +40,9 @@ SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
 """``SKEW_RADPS_PER_MPS``: yaw rate in rad/s that is allowed for each commanded m/s.
 
-``SKEW_MPS_PER_RADPS``: speed in m/s that is allowed for each commanded rad/s. The robot's wheels
-differ by some per cent.
+``SKEW_MPS_PER_RADPS``: speed in m/s that is allowed for each commanded rad/s.
+
+Such motion is allowed, because the robot's wheels differ by some per cent.
 """
 CHANGING_RADPS_PER_MPS: Final = 0.4
 """Yaw rate in rad/s that is allowed for each m/s by which the set-point changes.
@@ -50,8 +51,10 @@ The robot may turn during such a change, because its wheels accelerate different
 """
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
-"""Factor that converts a yaw rate in rad/s to a speed in m/s: the ratio of the two tolerated noise
-speeds."""
+"""Factor that converts a yaw rate in rad/s to a speed in m/s.
+
+It is the ratio of the two noise limits, ``NOISE_MPS`` and ``NOISE_RADPS``.
+"""
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )

@@ -93,10 +93,11 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Return whether a frame follows at ``at``. If so, odd content before ``at`` is from a shock.
+    """Return whether a frame begins at ``at``, the end of a frame with odd content.
 
-    If the bytes after the frame at ``at`` cannot begin another frame, the result is False. If
-    ``at`` is the end of ``held``, the result is ``closed``: whether no more bytes come.
+    If so, the odd content is from a shock, not from damage. If the bytes after the frame at ``at``
+    cannot begin another frame, the result is False. If ``at`` is the end of ``held``, the result is
+    ``closed``: whether no more bytes come.
     """
     if at == len(held):
         return closed

@@ -31,14 +31,19 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
 
-A pose contradicts the configured frame if the sum of the deltas in this frame misses the pose by
-more than ``CLEARLY_M``, and by more than ``TIMES`` times the error in the other frame.
+The deltas are added up in each of the two frames. The error of a sum is its distance from the
+board's pose. The pose contradicts the configured frame if the error in this frame is above
+``CLEARLY_M``, and also above ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""``FEWEST_DELTAS``, ``FOR_S``: the user is advised to set another period of the deltas only after
-this number of consecutive deltas with that period, and only after this time in s."""
+"""Limits for the advice to change the setting of the period of the deltas.
+
+``FEWEST_DELTAS``: number of consecutive deltas that must show the same other period.
+
+``FOR_S``: time in s for which they must show it.
+"""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}

@@ -34,19 +34,21 @@ An adapter with a timer of 16 ms reads at five phases of a 10 ms tick. Each phas
 In 12 reads, each phase occurs twice, including the phase with the least delay.
 """
 CALM: Final = 0.45
-"""Largest difference from the fitted clock, in periods, of a read whose tick number is certain.
+"""Largest difference between a read's arrival and the fitted clock, in periods, for the fast path.
 
-The previous read must also be this near to the fitted clock. Keep the value below 0.5: half-way to
-the next tick, the number would be uncertain.
+The previous read must also be this near to the fitted clock. Keep the value below 0.5: half-way
+between two ticks, it is uncertain to which tick a read belongs.
 """
 LARGEST_RISE: Final = 0.02
-"""Fraction by which the step from one stamp to the next may exceed the period. So the stamps
-approach the fitted clock slowly if a new fit makes this clock later."""
+"""Fraction by which the step from one stamp to the next may exceed the period.
+
+A new fit can make the fitted clock later. The stamps then approach it slowly.
+"""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times do not allow a larger step."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
-"""Boundary of a read that ended with a complete sample."""
+"""The place in the board's data at which a read ended, if its last sample is complete."""
 
 
 class DeviceClock:
@@ -75,27 +77,28 @@ class DeviceClock:
         self._seen_tick: int | None = None
         self._settled = False
         self._calm: ClockFit | None = None
-        """The fitted clock, if the last read was near to it and ended with a complete sample.
+        """The fitted clock; None if the fast path must not be used.
 
-        Otherwise None, and the fast path is not used.
+        The fast path is used only if the last read ended with a complete sample, and its arrival
+        was near to the time that the fitted clock predicts.
         """
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
-        """Time in s at which a new tick was seen last.
+        """Time in s of the last read that brought a new tick.
 
-        If the next new tick is seen within half a period, both ticks had waited to be read.
+        If the next new tick is read within half a period, both ticks had waited to be read.
         """
         self._awaited: Point | None = None
-        """Lower bound for the time of the tick after the newest one: at this time in s, that tick
-        had not arrived yet."""
+        """Number of the next tick, and the earliest time in s at which its sample is complete."""
         self._cut_off: Point | None = None
-        """Lower bound for the time of the tick whose sample was incomplete in the last read.
+        """Number of the tick whose sample was incomplete in the last read, and a time in s.
 
-        None if the last read ended with a complete sample.
+        The time is the earliest at which this sample can be complete.
 
-        The bound is valid only if the rest of the sample arrives.
+        It is valid only if the rest of the sample arrives. None if the last read ended with a
+        complete sample.
         """
 
     @property
@@ -107,7 +110,9 @@ class DeviceClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None = WHOLE
     ) -> list[float]:
-        """Return the sampling time in s of each reading. Their last bytes were read at ``now``.
+        """Return the sampling time in s of each reading.
+
+        ``now``: time in s at which the last bytes of the readings were read.
 
         Stamps increase from tick to tick, up to ``now``. A displacement has the stamp of its tick.
 
@@ -256,8 +261,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record the delay ``lag_s`` of a new tick, which was read at ``now``.
 
-        ``lag_s``: arrival of the tick minus its time by the fitted clock, in s. Of ticks that were
-        read within half a period, only the last ``lag_s`` is stored.
+        ``lag_s``: arrival of the tick minus its time by the fitted clock, in s. If several ticks
+        were read within half a period, only the ``lag_s`` of the last tick is stored.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -274,8 +279,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: this stamp's share, in s, of the time between the last stamp and the arrival.
-        The least step is limited to this share, so that time is left for later stamps.
+        ``room_s``: largest allowed value, in s, for the smallest step from the last stamp. Stamps
+        must not be later than the arrival, so time must be left for the other stamps of this read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -36,7 +36,8 @@ def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop an uncontrolled motion (F, B, RM, R, L).
 
     Return whether the caller must wait for the notice that the motion has ended. A motion that is
-    already stopping, or a drive (F, B, RM) that the server does not supervise, does not change.
+    already stopping does not change. A drive (F, B, RM) that the server does not supervise does not
+    change either.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:
@@ -74,9 +75,10 @@ def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
 
 
 def _limit(server: "MartServer", text: str) -> None:
-    """Limit an unlimited move (SDR).
+    """Execute SDR: give an unlimited move a limit.
 
-    The command gives a distance in inches, counted from the place where the move began.
+    ``text``: the command with a distance in inches, which counts from the place where the move
+    began.
     """
     motion = next(
         (each for each in server.motions if each.running and each.kind in DRIVES[1:3]), None

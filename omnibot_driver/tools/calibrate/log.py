@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A log of the robot's data and commands in one motion, or in one recording without commands.
+"""A log of the robot's data and commands in one motion.
+
+A log can also be a recording of data without commands.
 
 All times are in s, by ROS's clock: the sampling times of data, and the sending times of commands.
 This module knows rows and columns of numbers; it does not know ROS.

@@ -17,12 +17,16 @@ to 0.6 s."""
 REPEAT_S: Final = 0.3
 """Time in s for which a repeated key moves the robot. Several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""If ``command`` is not called for this time in s, the program was probably suspended.
+"""Longest time in s between two calls of ``command`` while the program runs.
 
-Keys from before or during the suspension are discarded.
+After a longer time, the user or the computer has probably suspended the program. Keys from before
+or during the suspension are discarded.
 """
 DEAF_S: Final = 0.3
-"""For this time in s after a suspension, keys do not steer, because earlier keys still arrive."""
+"""Time in s after a suspension of the program in which keys do not steer.
+
+Keys that were pressed during the suspension still arrive in this time.
+"""
 ZEROS: Final = 5
 """Number of zero commands that follow a motion.
 
@@ -63,7 +67,7 @@ class DeadMan:
     def press(self, key: str, now_s: float) -> bool:
         """Handle a pressed key; return whether it is a steering key.
 
-        A key that was pressed during a suspension does not move the robot.
+        A key that was pressed while the program was suspended does not move the robot.
         """
         if key not in MOTIONS:
             return False

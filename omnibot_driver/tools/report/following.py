@@ -112,9 +112,9 @@ def shown(log: Log) -> list[Pair]:
 
 
 def _sampled(series: Series) -> Series:
-    """Return the finite rows that have a timestamp, with timestamps of the recorder's clock.
+    """Return the finite rows that have a timestamp. Convert timestamps to the recorder's clock.
 
-    Commands, states and e-stops have times of that clock.
+    They can then be compared with commands, states and e-stops, whose times are by that clock.
     """
     rows = series.only(series.finite & np.isfinite(series.stamp_s))
     return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)

@@ -328,9 +328,11 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
-    """The driver shuts down while the robot brakes for a loading and a setting waits to be written.
+    """The driver shuts down while the robot brakes before the loading of a configuration.
 
-    The loading fails with this reason. Only stops follow, and the angles of the front wheel.
+    The request to load fails, and its answer names the shutdown as the reason. A changed setting
+    still waits to be written. The driver does not write it. It only sends commands to stop, and the
+    angles of the front wheel.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

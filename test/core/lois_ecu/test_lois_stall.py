@@ -167,9 +167,10 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """A wheel rests, and its reported speed is below its set-point.
+    """A wheel rests, and the board reports a speed below its set-point.
 
-    The controller gives it power, so the wheel starts by itself.
+    The controller gives the wheel power, so the wheel starts by itself. Therefore, the wheel is not
+    reported as stalled.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -185,9 +186,10 @@ def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """Below 2 RPM a wheel need not turn. Duty commands bypass the speed controllers.
+    """Two wheels do not turn, and no stall is reported.
 
-    Neither case is reported as a stall.
+    In one case, the set-points are below 2 RPM, so the wheels need not turn. In the other case, the
+    command is a duty, which bypasses the speed controllers.
     """
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []

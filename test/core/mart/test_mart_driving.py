@@ -68,9 +68,9 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """On a slow network with losses, the driver checks the IMU before each start.
+    """On a slow network with losses, the driver checks the IMU before it starts a motion.
 
-    The start follows within 0.2 s, apart from the delays of the network.
+    It starts the motion within 0.2 s after the check. The network adds its delays.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:

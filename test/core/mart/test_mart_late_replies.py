@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that a reply is not taken for another one on a network that delays or duplicates it."""
+"""Tests of a network that delays or duplicates replies.
+
+The driver must not take the reply to one request for the reply to another.
+"""
 
 import math
 from collections.abc import Callable
@@ -103,8 +106,8 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
     """A documented server supports neither SSP (speed of turns) nor RST IMU (check of the IMU).
 
-    Each of its refusals arrives twice. The driver does not take a copy for the reply to the next
-    check of the IMU. The robot drives.
+    Each of its refusals arrives twice. The driver does not take the second copy for the reply to
+    the next check of the IMU, so the robot drives.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -142,11 +145,14 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
-    """All replies come 0.28 s late. So the driver must assume that a copy of a move may be running.
+    """The robot drives to a goal, and all replies come 0.28 s late.
 
-    The driver sends a stop after each move. Without a duplicate there is nothing to stop. The
-    server then answers sooner than after the stop of a motion, and the robot reaches the goal. With
-    a duplicate, the driver reports it, and adds the first run to the odometry.
+    After each move, a duplicate of the request may make the robot move a second time. So the driver
+    sends a stop. If there is no duplicate, the server has nothing to stop, and answers the stop
+    sooner. The driver then continues, and the robot reaches the goal.
+
+    ``copied``: whether there is a duplicate. If so, the driver reports it, and adds the first run
+    to the odometry.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""

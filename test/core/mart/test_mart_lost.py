@@ -14,7 +14,10 @@ pytestmark = pytest.mark.slow
 def outlived(
     firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
 ) -> MartBench:
-    """Return a bench whose IMU died in a motion and works again, with a stop port that hangs."""
+    """Return a bench with a stop port that hangs.
+
+    The IMU died in a motion, so the driver used the stop port. Now the IMU works again.
+    """
     bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
     bench.command(*motion, 2.5)
     bench.server.imu.alive = False
@@ -42,8 +45,9 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """The IMU dies in a motion and works again later, but the server's stop port stays hung.
 
-    The driver refuses motion until the heading shows a restart. A gap in the network does not end
-    the refusal, although the heading drifts, and a user turns the robot by hand meanwhile.
+    The driver refuses motion until the heading shows a restart. Then the network fails for a time.
+    Meanwhile, the heading drifts, or a user turns the robot by hand. The driver does not take the
+    new heading for a sign of a restart, so it still refuses motion.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -67,10 +71,11 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     delay_s: float, seed: int
 ) -> None:
-    """The IMU works again, so the server answers all waiting requests at once.
+    """The IMU dies in a motion, so the server hangs in the driver's stop command.
 
-    The server hung in a stop, and answers it only after the driver has used the stop port. So the
-    stop port hangs, and the driver refuses motion, even if the server's name arrives first.
+    The driver uses the stop port, which then hangs. When the IMU works again, the server answers
+    all waiting requests at once, and the network reorders the replies. The driver refuses motion,
+    even if the server's name arrives before the reply to the stop command.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -131,7 +136,8 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
     """The server's process is stopped while the robot is at rest, and continues after 5 s.
 
     Meanwhile the driver has used the stop port. The server then answers the queries that have
-    waited. The driver does not take their values for the end of a motion.
+    waited. The driver does not regard the values in these replies as results of a motion, so it
+    drives the robot again.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

@@ -39,10 +39,10 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """Wheel angles are computed from ``rolled``, the sum of the robot's displacements.
+    """The board reports displacements along the axes of the earth, or along those of the robot.
 
-    The board reports displacements along the axes of the earth or of the robot. In both cases, the
-    sum is right, and the wheel angles, converted back, give the same turn of the body.
+    In both cases, ``rolled`` is the right sum of the displacements. The wheel angles are computed
+    from ``rolled``. If they are converted back, they give the turn in ``rolled``.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):

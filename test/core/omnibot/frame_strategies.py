@@ -34,8 +34,10 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    A pose is at most 1e7, in mm or mrad. An acceleration word of -6 has the bytes of a header. A
-    frame with such a word is excluded if its acceleration is below 0.5 g.
+    A pose is at most 1e7, in mm or mrad.
+
+    An acceleration word of -6 has the bytes of a header. For an IMU frame with such a word, the
+    result is True only if its acceleration is at least 0.5 g.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7
@@ -86,7 +88,11 @@ def _calm_frames(draw: st.DrawFn) -> list[Frame]:
 
 
 calm_frames = _calm_frames()
-"""Frames in any order, each close to the last one of its kind, with consecutive counters."""
+"""Frames of all kinds, in any order.
+
+The values of a frame are close to those of the previous frame of the same kind. The counters are
+consecutive.
+"""
 
 commands = st.builds(CommandFrame, st.integers(0, 255), triples)
 byte_orders = st.sampled_from(["big", "little"])

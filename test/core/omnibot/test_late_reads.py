@@ -164,9 +164,9 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """A reader stops within the last frame, or within the «Paused» text that follows.
+    """A reader pauses within the last frame, and then within the «Paused» text that follows.
 
-    The frame and the text are returned.
+    The decoder returns the frame and the text.
     """
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"

@@ -1,8 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the text lines that the two simulated Teensys send and obey.
-
-A *half* is one of the two Teensys (drive or front).
+"""Tests of the text lines that the two simulated Teensys (drive and front) send and obey.
 
 Checksums, comments, subscriptions and firmware variants are tested.
 """
@@ -68,7 +66,7 @@ def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
 def test_a_line_without_a_sum_is_executed_under_protest() -> None:
     """The host sends a line without a checksum to firmware that uses checksums.
 
-    The half obeys the line and answers with a comment.
+    The Teensy obeys the line and answers with a comment.
     """
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, "rc 2 0.5 0")
@@ -80,7 +78,7 @@ def test_a_line_without_a_sum_is_executed_under_protest() -> None:
 def test_firmware_without_sums_does_not_know_them() -> None:
     """The host sends a line with a checksum to firmware that uses none.
 
-    The half reports an unknown command.
+    The Teensy reports an unknown command.
     """
     rig = Rig().booted()
     (answer,) = rig.ask(DRIVE, ";19rc 1 0.5 65")
@@ -90,7 +88,10 @@ def test_firmware_without_sums_does_not_know_them() -> None:
 
 
 def test_an_unknown_command_is_a_comment() -> None:
-    """The host sends an unknown command. The half answers with a comment that names the command."""
+    """The host sends an unknown command.
+
+    The Teensy answers with a comment that names the command.
+    """
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(FRONT, ";35fly")
     assert wire.checked(answer)[0] is wire.Check.GOOD
@@ -99,9 +100,9 @@ def test_an_unknown_command_is_a_comment() -> None:
 
 @pytest.mark.parametrize("text", ["stop", "start"])
 def test_the_front_half_does_not_know_stop_and_start(text: str) -> None:
-    """Only the drive half has the commands ``stop`` and ``start``.
+    """Only the drive Teensy has the commands ``stop`` and ``start``.
 
-    The front half reports an unknown command.
+    The front Teensy reports an unknown command.
     """
     rig = Rig().booted()
     assert rig.ask(FRONT, text)[0].endswith(f"unhandled: '{text}'")
@@ -122,9 +123,9 @@ def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
 
 
 def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
-    """The host subscribes to a message. It is sent periodically until the period is set to zero.
+    """The host subscribes to a message of the front Teensy, which does not acknowledge this.
 
-    The half does not acknowledge a subscription.
+    The Teensy sends the message periodically until the host sets the period to zero.
     """
     rig = Rig().booted()
     assert rig.ask(FRONT, "sub fwl 15") == []
@@ -170,7 +171,7 @@ def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key
 
 
 def test_help_is_a_flood_of_text_without_comment_marks() -> None:
-    """After ``help`` each half prints the text of the manual, in many lines without ``#``."""
+    """After ``help`` each Teensy prints the text of the manual, in many lines without ``#``."""
     rig = Rig().booted()
     drive, front = rig.ask(DRIVE, "help"), rig.ask(FRONT, "help")
     assert len(drive) > 55
@@ -230,9 +231,10 @@ def test_a_number_that_is_too_large_ends_no_board(port: int, line: str) -> None:
 
 
 def test_lines_end_with_or_without_a_carriage_return() -> None:
-    """A half accepts lines with and without a carriage return. The manual does not show line ends.
+    """A Teensy accepts lines with and without a carriage return.
 
-    A setting of the firmware determines whether a half sends carriage returns.
+    A setting of the firmware determines whether a Teensy sends carriage returns. The manual does
+    not show line ends.
     """
     rig = Rig().booted()
     rig.board.receive(b"stop\r\n", 0.0, DRIVE)
@@ -263,7 +265,7 @@ def test_variants_of_messages() -> None:
 def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
     """The board keeps its time in single precision.
 
-    After two hours it has steps of about 0.5 ms.
+    After two hours, the time advances in steps of about 0.5 ms.
     """
     firmware = Firmware(sums=False, single_precision=True)
     rig = Rig(firmware=firmware, uptime_s=8000.0)
@@ -274,7 +276,7 @@ def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
 
 
 def test_the_two_clocks_run_apart() -> None:
-    """Each half has its own crystal, so the clocks of the two halves differ more and more."""
+    """Each Teensy has its own crystal, so the clocks of the two Teensys differ more and more."""
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.0)
     assert rig.board.drive.clock_s == pytest.approx(20.004)
@@ -283,8 +285,9 @@ def test_the_two_clocks_run_apart() -> None:
 
 @pytest.mark.slow
 def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
-    """One clock is fast, the other slow. Each half sends a heartbeat every 0.4 s by its own clock.
+    """The clock of one Teensy is fast, that of the other Teensy is slow.
 
+    Each Teensy sends a heartbeat every 0.4 s by its own clock.
     So the time in a heartbeat is right within a millisecond, the duration of a cycle.
     """
     rig = Rig(clock_ppm=(200.0, -300.0))
@@ -298,7 +301,7 @@ def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
 
 
 def test_bytes_to_the_boards_can_be_lost() -> None:
-    """Some bytes to the halves are lost. The seed determines which."""
+    """Some bytes to the Teensys are lost. The seed determines which bytes are lost."""
     heard = []
     for _ in range(2):
         rig = Rig(firmware=SUMS, lose_inbound=0.05, seed=3).booted()
@@ -313,7 +316,7 @@ def test_bytes_to_the_boards_can_be_lost() -> None:
 def test_three_lost_characters_leave_a_valid_command() -> None:
     """A command loses the characters ``c``, ``2`` and ``1``, which add 0 to the checksum modulo 99.
 
-    The checksum is still right, so the half obeys the command.
+    The checksum is still right, so the Teensy obeys the command.
     """
     rig = Rig(firmware=SUMS).booted()
     whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"

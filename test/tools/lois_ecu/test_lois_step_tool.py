@@ -63,9 +63,10 @@ def test_a_robot_is_calibrated_from_its_records(
 def test_a_limit_that_reduces_the_full_duty_is_named(
     tmp_path: Path, limit: str, value: float
 ) -> None:
-    """The driver would reduce the duty of the measurement. The tool asks for a higher limit.
+    """A parameter of the driver limits the duty to less than the tool commands.
 
-    Otherwise gain and dead zone would be those of a smaller duty, and the gains would be wrong.
+    The tool ends with an error that names the parameter. If the tool measured with the smaller
+    duty, the measured gain and dead zone would be wrong, and so would the gains.
     """
     robot = SimulatedRobot(tmp_path, random_motors(5))
     robot.set_parameters({limit: value})
