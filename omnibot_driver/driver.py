@@ -13,6 +13,7 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from typing import Final
 
 from omnibot_driver.core.errors import ParameterError
@@ -167,6 +168,8 @@ def _run(ending: Ending, args: list[str]) -> None:
 
     if ending.begun:
         return
+    # rclpy's warning that an answer of a service was lost: report each one, not only the first
+    warnings.filterwarnings("always", "failed to send response", RuntimeWarning)
     driver = OmniBotDriver(end=ending.begin)
     for advice in selfcheck.unread_files(args, driver.get_fully_qualified_name()):
         driver.get_logger().warning(advice)

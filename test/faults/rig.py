@@ -19,7 +19,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
 from nav_msgs.msg import Odometry
 from ports import Terminal
-from probe import Probe
+from probe import ANSWER_LOST, Probe
 from published import stamp_s
 from rig_board import RigBoard
 from sensor_msgs.msg import Imu
@@ -121,6 +121,7 @@ class Rig:
             Driver(before=self._before, **self.ports, **self._parameters)
         )
         self.probe = self._stack.enter_context(Probe(self.driver.namespace))
+        self.driver.answers[ANSWER_LOST] = self.probe.call_again
         self.imu = self.probe.listen(Imu, "imu/data_raw") if self.kind.imu else []
         self.odom = self.probe.listen(Odometry, "odom")
         self.states = self.probe.listen(String, "omnibot_driver/state", latched=True)

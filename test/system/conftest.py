@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from driver_process import PATIENCE_S, Driver
-from probe import Probe, ros
+from probe import ANSWER_LOST, Probe, ros
 from std_srvs.srv import SetBool
 
 from omnibot_driver.shared_session import WAITED
@@ -55,12 +55,13 @@ def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
     If the driver refuses the probe's newest message because of a stall, the probe publishes the
-    message again.
+    message again. If an answer to the probe is lost, the probe calls the service again.
     """
 
     def start(driver: Driver) -> Probe:
         probe = stack.enter_context(Probe(driver.namespace))
         driver.answers[WAITED] = probe.publish_again
+        driver.answers[ANSWER_LOST] = probe.call_again
         return probe
 
     return start

@@ -26,6 +26,8 @@ from omnibot_driver.stall_detector import SETTLE_S
 if TYPE_CHECKING:
     import pytest
 
+ANSWER_LOST = "client will not receive response"
+"""Words in the driver's output when the middleware has dropped an answer of a service."""
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """Options that turn off the events of the middleware, for subscriptions and for publishers.
@@ -70,6 +72,7 @@ class Probe:
         self.node = Node("probe", namespace=namespace, start_parameter_services=False)
         self._received: dict[str, list[Any]] = {}
         self._clients: dict[str, Any] = {}
+        self._answers: list[Answer] = []
         self._changed = threading.Condition()
         self._publish_again: Callable[[], None] = lambda: None
         self._executor = SingleThreadedExecutor()
@@ -172,6 +175,17 @@ class Probe:
 
         threading.Timer(WARN_EVERY_S + 2 * SETTLE_S, publish).start()
 
+    def call_again(self) -> None:
+        """Repeat the calls that have no answer yet.
+
+        The middleware drops an answer if the driver has not discovered the new client within
+        0.1 s. On a busy computer this can take longer.
+        """
+        for answer in self._answers:
+            if not answer.arrived:
+                with suppress(InvalidHandle):  # the test has ended
+                    answer.call()
+
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
         """Publish a velocity, in m/s and rad/s, on ``cmd_vel`` at 10 Hz while the context lasts."""
@@ -221,7 +235,10 @@ class Probe:
         return client
 
     def call_async(self, kind: type, service: str, **request: object) -> "Answer":
-        return Answer(self.client(kind, service), kind.Request(**request))  # type: ignore[attr-defined]
+        answer = Answer(self.client(kind, service), kind.Request(**request))  # type: ignore[attr-defined]
+        self._answers.append(answer)
+        answer.call()
+        return answer
 
     def wait_for_future(self, future: Any) -> None:
         done = threading.Event()
@@ -244,9 +261,17 @@ class Answer:
     """A service call in progress."""
 
     def __init__(self, client: Any, request: Any) -> None:
+        self._client, self._request = client, request
         self._done = threading.Event()
-        self._future = client.call_async(request)
-        self._future.add_done_callback(lambda _: self._done.set())
+        self._answer: Any = None
+
+    def call(self) -> None:
+        """Send the request."""
+        self._client.call_async(self._request).add_done_callback(self._arrive)
+
+    def _arrive(self, future: Any) -> None:
+        self._answer = future.result()
+        self._done.set()
 
     @property
     def arrived(self) -> bool:
@@ -254,4 +279,4 @@ class Answer:
 
     def wait(self) -> Any:
         assert self._done.wait(PATIENCE_S), "no answer"
-        return self._future.result()
+        return self._answer
