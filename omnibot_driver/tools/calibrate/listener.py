@@ -155,9 +155,9 @@ class Listener(Client):
         """Raise ToolError if the driver's clock and this computer's differed in this motion."""
         if math.isfinite(self._delay_s) and abs(self._delay_s) > CLOCKS_S:
             raise ToolError(
-                f"the odometry arrives {self._delay_s:.2f} s after its timestamps at best, so the"
-                " clocks of this computer and of the robot differ, and the commands cannot be"
-                " compared with the motion: synchronise the clocks (chrony), or run this tool on"
+                f"the fastest odometry message arrives {self._delay_s:.2f} s after its timestamp."
+                " So the clocks of this computer and of the robot differ, and the commands cannot"
+                " be compared with the motion. Synchronise the clocks (chrony), or run this tool on"
                 " the robot's computer"
             )
 
