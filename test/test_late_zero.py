@@ -35,7 +35,10 @@ def obey_an_old_stamp(session: Session, data: bytes, now: float) -> None:
 
 
 class Topic:
-    """The topic cmd_vel of a driver, at the simulated time of the bench with its session."""
+    """The topic cmd_vel of a driver, with the session of the bench.
+
+    The driver's clocks show the simulated time of the bench.
+    """
 
     def __init__(self, bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         def now_ns() -> int:
@@ -78,9 +81,9 @@ def source(bench: Any) -> str | None:
 
 
 def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
-    """Return a MART that drives to a goal, and its topic cmd_vel.
+    """Return a bench whose MART drives to a goal, and the topic cmd_vel of its driver.
 
-    A zero command arrived on this topic before the goal.
+    Before the goal, a zero command arrived on this topic.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)
@@ -124,7 +127,10 @@ def test_a_late_velocity_and_nan_do_not_end_a_goal(
 
 
 def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A velocity expires by itself, and may be newer than the zero."""
+    """The robot drives by cmd_vel, and a zero command arrives late. The driver refuses the zero.
+
+    The velocity stays in effect. It may be newer than the zero, and it expires by itself.
+    """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)
     topic.hear(0.3)
@@ -136,7 +142,11 @@ def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -
 def test_a_zero_ends_no_goal_on_a_board_whose_switch_is_on_positional_control(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With ``control_method: position`` the driver refuses cmd_vel. The goal stays in effect."""
+    """``control_method`` is ``position``, and the robot drives to a goal. Zeros arrive on cmd_vel.
+
+    With this control method, the driver refuses all commands on cmd_vel. So the goal stays in
+    effect.
+    """
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()
     bench.run_until_state("nominal")

@@ -161,7 +161,7 @@ def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> Non
 def test_an_imu_message_has_no_orientation() -> None:
     """The orientation's covariance begins with -1, which means "unknown" by REP-145.
 
-    Force and rate are as measured.
+    Specific force and angular rate are those of the estimate, unchanged.
     """
     estimate = ImuEstimate(0.0, (1.0, 2.0, -9.8), (0.1, 0.2, 0.3))
     message = messages.imu_message(estimate, STAMP, SETTINGS)

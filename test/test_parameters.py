@@ -187,9 +187,9 @@ def test_odom_and_base_must_be_different_frames() -> None:
 def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """With position control, axis signs are refused if the yaw sign is not the product of x and y.
+    """With position control, the sign of the yaw axis must be the product of the signs of x and y.
 
-    With velocity control, these signs are accepted.
+    Other signs are refused. With velocity control, they are accepted.
     """
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
@@ -262,7 +262,7 @@ def in_the_file() -> dict[str, object]:
 
 
 def test_the_file_has_its_former_name_as_well() -> None:
-    """The parameter file also keeps its former name for one release."""
+    """For one release, the parameter file also exists under its former name, with equal content."""
     assert FORMER.read_bytes() == CONFIG.read_bytes()
 
 
@@ -323,6 +323,9 @@ def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
 
 
 def test_a_minimum_without_a_maximum_is_accepted() -> None:
-    """A board has a parameter whose name ends in ``_minimum``, without one for the maximum."""
+    """A board has a parameter whose name ends in ``_minimum``, and no parameter ``…_maximum``.
+
+    If both existed, their values would be checked together. The single parameter is accepted.
+    """
     row = Parameter("battery_minimum", 20.0, "V", "Lowest voltage.", low=0.0, high=60.0)
     assert parameters.table("omnibot", OmniBot.traits, own={"Own": (row,)}).check_all({})

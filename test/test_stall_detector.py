@@ -72,7 +72,8 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
     """The driver stalls three times. Commands from before the end of the last stall are refused.
 
-    The middleware may deliver a command only after several stalls.
+    This includes commands from before the earlier stalls, because the middleware may deliver a
+    command only after several stalls.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)

@@ -46,7 +46,11 @@ class Liveness:
         return now - self.heard_at >= self.unheard_s
 
     def is_silent(self, now: float) -> bool:
-        """Return whether no data came for ``Traits.silence_s``, or none since the port opened."""
+        """Return whether the board is silent.
+
+        It is silent if no bytes have arrived since the port opened, or if the last reading arrived
+        ``Traits.silence_s`` ago or earlier.
+        """
         return self.came_at == -math.inf or now - self.heard_at >= self.silence_s
 
     def fell_silent(self, now: float) -> bool:

@@ -62,7 +62,7 @@ def trust(data: bytes) -> list[Frame]:
 
 
 def trust_all(blocks: Sequence[bytes]) -> int:
-    """Return the number of frames in all blocks.
+    """Decode all blocks; return the number of frames in them.
 
     The frames are not kept, because keeping them costs time.
     """

@@ -31,9 +31,9 @@ from omnibot_driver.core.readings import PoseReading
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
 def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
-    """Deltas arrive before the board's first pose, and wait for it.
+    """Deltas that arrive before the board's first pose wait for it.
 
-    They are then published as if the pose had come first.
+    When the pose arrives, they are published as if the pose had come first.
     """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
@@ -221,7 +221,10 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """The board's first pose arrives after the reset. Odom contains only the motion since then."""
+    """The odometry is reset, and the board's first pose arrives only later.
+
+    Odom contains the motion since the reset, and no motion from before it.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)

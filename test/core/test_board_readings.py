@@ -139,7 +139,10 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_release_of_the_button_without_its_press_latches_the_estop(bench: AnyBench) -> None:
-    """The message of a press is lost, so only the release arrives. It proves the press."""
+    """The message of a press is lost, so only the message of the release arrives.
+
+    A release proves that the button was pressed before, so the driver latches the e-stop.
+    """
     bench.drive_on()
     tell(bench, EStopButtonReading(False))
     assert bench.session.estop_active

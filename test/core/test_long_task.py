@@ -55,9 +55,9 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task runs while the robot is at rest. This is not a stop of a drive, so the task continues.
+    """A task runs while the robot is at rest. The robot never drove, so it was not stopped.
 
-    If the robot is driven and then stopped, the task ends.
+    Therefore the task continues. Then the robot is driven and stopped, which ends the task.
     """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)

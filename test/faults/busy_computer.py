@@ -25,7 +25,8 @@ TICKS: Final = 3000
 SILENCE_S: Final = 1.0
 """Shortest interruption of the data, in s, after which the driver is allowed to blame the cable."""
 TRANSIT: Final = 200
-"""Largest number of sent frames whose messages have not arrived when the comparison begins."""
+"""Number of frames, sent before the comparison begins, whose messages may arrive after it begins.
+"""
 REACH: Final = 200
 """Number of sent frames with which a published message is compared.
 

@@ -10,9 +10,9 @@ from other_rigs import NetworkRig
 from stuck import NETWORK
 
 LEFT_OUT = "socket: the server delays the data to the board"
-"""A case that is similar to the one in which the server holds everything.
+"""Name of a case that this module omits.
 
-``make faults`` runs both.
+It is similar to the case in which the server delays all data. ``make faults`` runs both.
 """
 CASES = {name: case for name, case in NETWORK.items() if name != LEFT_OUT}
 
@@ -30,9 +30,9 @@ def network(
 def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
     case: Callable[[NetworkRig], None], network: NetworkRig
 ) -> None:
-    """The server of the board fails during a drive, and the robot comes to rest.
+    """The network server in front of the board fails during a drive, and the robot comes to rest.
 
-    The robot obeys when the server works again.
+    When the server works again, the robot obeys a new command.
     """
     case(network)
     network.expect_moves_again()

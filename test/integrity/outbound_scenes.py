@@ -21,7 +21,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time in s from which the board runs, and the driver knows this."""
+"""Time in s from which a scene can drive: the board runs, and the driver knows that it runs."""
 STANDS_S: Final = 1.2
 """Time in s from the last command until the robot must be at rest."""
 ESTOPPED_S: Final = 0.3
@@ -93,7 +93,7 @@ def _estop(active: bool) -> Callable[[Session, float], object]:
 
 
 def _common(random: Random) -> dict[str, object]:
-    """Draw settings of a scene.
+    """Choose settings of a scene at random.
 
     Sometimes the scale, the rate or the acceleration limit is unusual.
     """
@@ -226,7 +226,10 @@ def reset(random: Random) -> Scene:
 
 
 def estop(random: Random) -> Scene:
-    """Make a scene in which the e-stop is latched while commands continue, and later released."""
+    """Make a scene in which the e-stop is latched, and later released.
+
+    Commands continue while the e-stop is latched.
+    """
     begin_s = FROM_S + random.uniform(0.1, 0.3)
     released_s = begin_s + random.uniform(0.35, 0.6)
     wishes = driving(random, FROM_S, released_s - 0.05, by_wheels=_wheels(random))

@@ -63,9 +63,9 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """One script of each scene is run.
+    """One script of each scene is run with all receivers. The bounds of the report hold.
 
-    Every receiver keeps the limits that a short run can check.
+    Bounds on rates are not checked, because a short run has too few frames.
     """
     scores, _ = one(0.025, (scene, 0), LOSSES)
     for fault in LOSSES:
@@ -81,9 +81,10 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The last byte of a motion frame is lost, so a zero of the next write completes the frame.
+    """The last byte of a motion frame is lost, so the first byte of the next write completes it.
 
-    The board obeys this wrong frame only until the next frame, for less than 1.5 ms.
+    This byte is a zero, so the frame is wrong. The board obeys it only until the next frame, for
+    less than 1.5 ms.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
@@ -105,9 +106,9 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """Two Stops follow each other, and the first one has lost a byte.
+    """A Stop has lost one byte, and the first byte of the next Stop completes its frame.
 
-    The board understands a wheel command of 255 LSB. The judge reports stray motion.
+    From this frame, the board reads a wheel command of 255 LSB. The judge reports stray motion.
     """
     judge = Judge()
     judge.write(parse(STOP), 0.0)
@@ -200,7 +201,8 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
     """Without the name of a scene, ``over`` adds the scores of all scenes that end a drive.
 
-    With a name, it adds only the scores of this scene, even if the scene only drives.
+    With the name of a scene, it adds only the scores of this scene, also if this scene does not end
+    its drive.
     """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),

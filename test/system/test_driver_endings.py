@@ -144,9 +144,10 @@ The code also makes the driver wait longer for its threads.
 def test_a_pending_service_answers_although_the_executor_learns_of_its_result_late(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver ends during a reset, while a callback runs. ``~/reset`` answers before the end.
+    """A user calls ``~/reset``. The driver ends before the board has finished the reset.
 
-    The answer says that the driver is shutting down.
+    At this time, a callback blocks the executor. The call is still answered: the answer says that
+    the driver is shutting down.
     """
     board = start_board(boot_time_s=1000.0, running=True)
     driver: Driver = start_driver(board.path, before=HOLDS_THE_EXECUTOR)

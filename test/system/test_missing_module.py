@@ -32,7 +32,10 @@ def test_it_says_what_is_missing_and_what_to_do(library: str) -> None:
 
 
 def started_with(**environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a driver that these environment variables keep from starting. Return its result."""
+    """Run a driver that cannot start in this environment. Return the result of its process.
+
+    ``environment``: environment variables that are set in addition to the present ones.
+    """
     return subprocess.run(
         [sys.executable, "-m", "omnibot_driver.driver", "--ros-args", "-p", "port:=sim://"],
         env={**os.environ, **environment},

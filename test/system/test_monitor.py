@@ -167,7 +167,10 @@ def test_the_speeds_of_the_keys_are_tenths_of_the_drivers_limit(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """The driver has a lower limit than its default. The monitor begins with three tenths of it."""
+    """The driver has a lower speed limit than the default.
+
+    The monitor begins at 30 % of the driver's limit.
+    """
     driver = start_driver("sim://", max_linear_speed=0.4)
     probe_of(driver).wait_for_state("nominal")
     terminal = monitor_of(driver, "--teleop")

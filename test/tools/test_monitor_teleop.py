@@ -73,7 +73,8 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
     """Keys that are pressed while the program is suspended are discarded. Later keys steer.
 
-    The order of key presses and commands does not matter.
+    After the suspension, the first key may come before the first call of ``command``, or after it.
+    Both orders are tested.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)

@@ -36,7 +36,7 @@ class Encoder(Protocol):
         """Return the packets that make the robot stand still."""
 
     def emergency_stop(self) -> Packets:
-        """Return the packets of the board's own emergency stop, without those of ``stop``."""
+        """Return the packets of the board's own emergency stop. They do not contain a Stop."""
 
     def encode(self, order: Order) -> Packets:
         """Return the packets for this order. Raises CommandRefused if it cannot be encoded."""

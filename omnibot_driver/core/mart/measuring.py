@@ -32,7 +32,7 @@ the robot still coasts.
 
 
 class Measuring(Starts):
-    """The part of the pilot that receives measurements."""
+    """The part of the class ``Pilot`` that receives measurements."""
 
     def _measured(self, answer: Answer, now: float) -> None:
         word, reply = answer.word, answer.reply

@@ -65,7 +65,7 @@ class MartOdometry(Reckoning):
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
         """Return the possible errors of the motion since the last encoder count.
 
-        They include the error of this count's time.
+        The time of this count is uncertain. The errors that result from this are included.
 
         ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the current
         controlled move, or None.

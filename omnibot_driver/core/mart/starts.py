@@ -42,7 +42,7 @@ STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 
 
 class Starts(FailedStarts):
-    """The part of the pilot that starts motions."""
+    """The part of the class ``Pilot`` that starts motions."""
 
     def _act(self, now: float) -> Packets:
         if self.state is State.STILL:
@@ -125,11 +125,11 @@ class Starts(FailedStarts):
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return whether ``start`` is a controlled move, and an earlier HELLO may arrive after it.
+        """Return True if ``start`` is a controlled move and an earlier HELLO may arrive after it.
 
         The server might answer this HELLO just before it executes a copy of the move. The answer
-        would then wrongly suggest that there is no copy. The result is False after a fresh check of
-        the IMU, because the driver waits before this check.
+        would then wrongly suggest that there is no copy. The driver waits before a check of the
+        IMU, so no earlier HELLO can arrive after a fresh check.
         """
         moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
         return moves and now < self._greeted_s + self._delay_s

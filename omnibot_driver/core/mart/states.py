@@ -150,8 +150,8 @@ NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
 With a dead IMU, the server starts the motors and never answers, or it waits for the IMU. Exception:
-it answers the controlled turns MCR and MCL with the failure that the IMU is dead. Before this
-answer, some servers turn the robot for 0.5 s.
+it answers the controlled turns MCR and MCL. This answer is a failure that names the dead IMU.
+Before it, some servers turn the robot for 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})

@@ -255,7 +255,7 @@ class OmniBot:
         return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))
 
     def force_pause(self) -> Packets:
-        """Return Stop, S and P: S makes the board run in any case, so P pauses it."""
+        """Return Stop, S and P. After S, the board runs in any case. P then pauses it."""
         stop = frames.encode(frames.STOP)
         return packed(transmission(stop, frames.FORCE_START, frames.TOGGLE_PAUSE))
 

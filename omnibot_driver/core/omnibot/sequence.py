@@ -29,11 +29,11 @@ After minutes of silence, this error is so large that the counter cannot show a 
 board's pose can then prove a restart.
 """
 EARLY_S: Final = 0.2
-"""Largest time in s by which a counter may be ahead of the elapsed time after a restart.
+"""Largest time in s by which the count after a restart may be ahead of the elapsed time.
 
-The elapsed time is measured from the arrival of the last delta before the restart. If this delta
-was read late, the elapsed time is too short. The elapsed time includes the restart itself, which
-takes longer than ``EARLY_S``.
+The elapsed time begins when the last delta before the restart is read. If this delta was read late,
+the elapsed time is too short. The elapsed time also contains the duration of the restart, which is
+longer than ``EARLY_S``. So the count is ahead only if the delta was read very late.
 """
 LONG_GAP_S: Final = 1.0
 """Duration of lost deltas, in s, above which the next pose cannot show a restart: the last delta is
@@ -71,7 +71,7 @@ class Sequence:
         happened, the counters of poses are ignored."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """Counter of the last delta if it was too high for the elapsed time, else None.
+        """Counter of the last delta, if it was too far ahead of the elapsed time; else None.
 
         Such a counter may be damaged. Until the next delta continues this counter, the number of
         lost deltas is computed from the elapsed time.

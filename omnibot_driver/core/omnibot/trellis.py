@@ -41,7 +41,7 @@ finds an interpretation.
 BEYOND: Final = 0.025
 """Small addition to the cost limit, so that rounding errors have no effect.
 
-All prices are multiples of 0.05; this addition is half of 0.05.
+All costs are multiples of 0.05; this addition is half of 0.05.
 """
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
@@ -92,8 +92,10 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""Start node, end node and cost of an edge. If the edge is a complete frame, also this frame and
-what is known after it."""
+"""Start node, end node and cost of an edge, a frame, and what is known after the frame.
+
+The last two are None if the edge is not a complete frame.
+"""
 
 
 def read(
@@ -108,7 +110,8 @@ def read(
 ) -> list[Segment]:
     """Return the complete frames of the best interpretation of ``data``.
 
-    ``in_step``: an accepted frame ended right before ``data``. ``closed``: no more bytes follow.
+    ``in_step``: whether an accepted frame ended right before ``data``. ``closed``: whether no more
+    bytes follow, because the line was closed or fell silent.
     """
     search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)
@@ -141,8 +144,8 @@ class _Search:
     def run(self, in_step: bool, closed: bool) -> None:
         """Find the best interpretation, and all others that cost at most ``SURE`` more.
 
-        ``in_step``: an accepted frame ended right before the bytes. ``closed``: no more bytes
-        follow.
+        ``in_step``: whether an accepted frame ended right before the bytes. ``closed``: whether no
+        more bytes follow.
         """
         self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
         step = STEP

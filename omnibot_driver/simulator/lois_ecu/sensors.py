@@ -53,7 +53,8 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether it averages plain numbers. The mean is then wrong near north.
+    ``over_north``: whether the mean is that of the plain numbers, so that the mean of 359 and 1 is
+    180. This mean is wrong near north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

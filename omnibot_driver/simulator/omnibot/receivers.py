@@ -97,7 +97,8 @@ class ReceiverKind:
 
     * ``framing``: how control frames are found.
     * ``letters``: where state letters act: between control frames, or anywhere.
-    * ``wakes_while_booting``: whether bytes during the boot wake the receiver; else they are lost.
+    * ``wakes_while_booting``: whether bytes that arrive during the boot wake the receiver. If not,
+      these bytes are lost.
     """
 
     framing: FramingName = "counting"

@@ -118,7 +118,8 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
 
-    After the second fault, motion is refused until ~/start.
+    The driver stops the robot, and a notice names ``allow_reverse``. The sender repeats its
+    command, so the driver stops the robot a second time. Motion is then refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)

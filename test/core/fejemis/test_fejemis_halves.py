@@ -215,8 +215,9 @@ def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
 ) -> None:
     """One board never sends anything, or both ports lead to a drive board.
 
-    The driver sends Stop for 5 s at most. Afterwards, it tries to start the robot twice a second,
-    and sends a Stop only with each try. A latched e-stop is repeated 20 times a second.
+    For up to 5 s, the driver repeats Stop. Afterwards, it tries to start the boards twice a second,
+    and sends one Stop with each try. If the e-stop is latched, the driver repeats it 20 times a
+    second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks

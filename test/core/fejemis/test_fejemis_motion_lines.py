@@ -163,9 +163,9 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
-    """The lines avoid certain digits, but the outer wheel reaches every speed within 1.8 %.
+    """The lines avoid certain digits. Still, the outer wheel reaches every speed within 1.8 %.
 
-    Negative speeds are the least exact, because they avoid one digit more.
+    Negative speeds are the least exact, because a line with a minus sign also avoids the digit 6.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.12**n for n in range(60))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -225,11 +225,11 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 @pytest.mark.slow
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """A motion line without a checksum loses one character, at each speed up to 1.1 m/s in steps of
-    1 mm/s.
+    """A motion line without a checksum loses one character. The outer wheel seldom becomes faster.
 
-    The outer wheel becomes faster only if this character is a decimal point or a digit of the
-    speed. The wheel changes its direction only if the character is the minus sign.
+    It becomes faster only if the character is the decimal point or a digit of the speed. It changes
+    its direction only if the character is the minus sign. The test tries each speed up to 1.1 m/s,
+    in steps of 1 mm/s.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):
@@ -253,7 +253,10 @@ def test_without_sums_the_drive_board_gets_the_speed_of_the_outer_wheel() -> Non
 
 
 def test_without_sums_a_whole_speed_keeps_its_decimal_point() -> None:
-    """A line without a checksum loses its last space. The 0 after it must not extend the speed."""
+    """The speed 1 m/s is written as ``1.``, so the line is ``rc 2 1. 0``.
+
+    If the line loses its last space, the board reads the speed as ``1.0``, which is the same speed.
+    """
     assert plain_drive_line(1.0, 0.0) == b"rc 2 1. 0"
     assert plain(b"rc 2 1.0\n") == [(2.0, 1.0, 0.0)]
 

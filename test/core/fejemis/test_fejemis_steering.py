@@ -161,7 +161,7 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The robot is commanded for 2.5 s. Its speed and its turn rate are then as commanded.
+    """The robot obeys a command for 2.5 s. Then it has the commanded speed and turn rate.
 
     The speed may be off by 1.2 % of the outer wheel's speed. The turn rate may be off by 3 % of the
     outer wheel's speed divided by the track width.
@@ -254,8 +254,9 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
     """Motion is refused after two stops by the motion monitor, and a sender repeats -0.3 m/s.
 
-    With ``allow_reverse`` off this is a command to stand still, which is accepted. When the user
-    sets ``allow_reverse``, the robot stays at rest, and the next command is refused.
+    While ``allow_reverse`` is off, the driver takes this for a command to stand still, and accepts
+    it. Then the user sets ``allow_reverse``. The robot stays at rest, and the driver refuses the
+    next command of the sender.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

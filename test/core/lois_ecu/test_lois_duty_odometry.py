@@ -40,7 +40,8 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
 def test_a_duty_of_the_other_sign_brakes_the_wheels(seed: int) -> None:
     """The duty changes from backward to forward. The motors are slower than the driver assumes.
 
-    The new duty brakes the wheels: they neither coast nor stop at once. The odometry includes this.
+    The new duty brakes the wheels: they neither coast nor stop at once. The odometry takes this
+    into account, and its error stays below 5 cm.
     """
     one = by_duty([(3.0, BACK), (3.0, PUSH)], seed, SLOW)
     assert one.way_m > 1.4

@@ -87,9 +87,10 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 
 
 def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_motion() -> None:
-    """Tick counts of 5 are sent before a reset. The wheels then roll out to counts of 3.
+    """The board has sent tick counts of 5. A reset sets the counts to 0 while the wheels roll out.
 
-    The driver does not conclude from the smaller counts that the board counts backward.
+    The board then sends counts of 3. They are smaller than the counts before the reset, but the
+    driver does not conclude that the board counts backward.
     """
     translation = Translation(LoisEcuSettings())
     translation.reset()

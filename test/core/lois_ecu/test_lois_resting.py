@@ -30,9 +30,10 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """The reported speed falls from 41 to 20 RPM and stays there.
+    """The reported speed falls from 41 to 20 RPM, and then 20 RPM is repeated.
 
-    Few wheels stop from 20 RPM, so only the third repetition shows rest.
+    A wheel seldom stops from a speed as high as 20 RPM. So two repetitions do not prove that the
+    wheel is at rest, but three do.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
@@ -41,9 +42,10 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
-    """The reported speed falls from 60 to 28 RPM and stays there, although no wheel is so steady.
+    """The reported speed falls from 60 to 28 RPM, and then the board repeats 28 RPM for long.
 
-    The board noticed a tick late, so the 28 RPM are wrong, and the wheel is at rest.
+    No rolling wheel is so steady, so the wheel is at rest. The 28 RPM are wrong: the board noticed
+    a tick late.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -105,9 +107,10 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 
 
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
-    """Most reports are lost, so the reported speeds fall from 25 to 9 RPM in a whole second.
+    """Most reports are lost. In the reports that arrive, the speed falls from 25 to 9 RPM in 1 s.
 
-    The wheel is at rest.
+    The fall seems slow, because a report arrives only every 0.5 s. The driver still concludes that
+    the wheel is at rest.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
@@ -124,10 +127,10 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """Most reports are lost. The reported speed never falls: it rises from 13 to 14 RPM, and stays.
+    """Most reports are lost. In the reports that arrive, the speed never falls: it rises to 14 RPM.
 
-    The whole fall may be in a gap. So the wheel may be at rest, and is surely at rest after many
-    reports. The same reports without gaps show a wheel that rolls.
+    The wheel may have slowed down during a gap. So it may be at rest, and many reports of the same
+    speed prove that it is. If no reports are lost, the same speeds are those of a wheel that rolls.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
@@ -138,7 +141,7 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """A busy computer reads three reports at once, 0.4 s after the last ones.
+    """A busy computer reads three reports at once, 0.4 s after the previous three reports.
 
     No report is lost, so a constant speed shows a wheel that rolls.
     """

@@ -145,10 +145,11 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_reset_is_not_repeated_after_the_answer_that_it_failed() -> None:
-    """The cable to the board is broken, so the board does not obey a reset, but its ticks arrive.
+    """Ticks arrive from the board, but it does not receive a reset, because a wire is broken.
 
-    The driver sends the reset at most eight times, and not after its answer. When the cable is
-    repaired, the next request succeeds.
+    The driver sends the reset up to eight times, and then answers that it failed. After this
+    answer, the driver does not send the reset again. When the wire is repaired, a new request
+    succeeds.
     """
     bench = Bench("documented")
     bench.drive_on(0.2, 1.2)
@@ -277,9 +278,9 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
 
 @FIRMWARE
 def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
-    """The driver repeats its settings after a connection, and then the shutdown begins.
+    """The driver repeats its settings after a reconnection. Meanwhile, the shutdown begins.
 
-    During the shutdown, the driver sends only Stop.
+    From then on, the driver sends only Stop, and no settings.
     """
     bench = Bench(firmware)
     bench.close()
@@ -308,11 +309,12 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
 @FIRMWARE
 @pytest.mark.parametrize("stall_s", [0.0, 1.3])
 def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_s: float) -> None:
-    """The user resets the board while its counts are on the line. The driver then reads 0 counts.
+    """The user resets the board while older tick counts are still on their way to the driver.
 
-    The difference is not a motion, and does not show that the board counts backward.
+    After these, the driver reads counts of 0. It does not take the difference for a motion, and
+    does not conclude from it that the board counts backward.
 
-    ``stall_s``: for this time before the reset, the driver reads nothing.
+    ``stall_s``: time in s, just before the reset, in which the driver reads nothing.
     """
     bench = Bench(firmware, HOST_GAINS)
     board = bench.session.board

@@ -68,8 +68,8 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
     """The user sets a terminal mode during a drive. In this mode, the board reports no motion.
 
-    So the driver first stops the robot, and writes the mode only after the standstill is proved. It
-    then logs no unconfirmed stop.
+    So the driver first stops the robot, and writes the mode only after the standstill is proved.
+    Therefore it does not log that the stop is unconfirmed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, drive_s)
@@ -86,10 +86,11 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode. The first lines that the driver sends to end it may be lost.
+    """The user ends a terminal mode. The board may miss the first lines that end the mode.
 
-    The driver reports the end only once. It restores the "short correction", a setting of the board
-    that the mode overwrote.
+    The driver still reports the end of the mode, and reports it once. It also restores the "short
+    correction", a setting of the board that the mode overwrote. Then the robot obeys commands
+    again.
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -204,9 +205,9 @@ def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -
 
 
 def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
-    """The user changes the duty scale while the robot is driven by duties, which depend on it.
+    """The robot is driven by duties, which depend on the duty scale. The user changes this scale.
 
-    The robot is stopped first.
+    The driver stops the robot first.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     bench.drive_on(0.3, 3.0)
@@ -332,10 +333,11 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """The robot is at rest, but the driver must write its settings before the terminal mode.
+    """A terminal mode is requested. In two situations, motion is refused because it is changing.
 
-    Later, after the mode was written, the board sends messages of its normal mode, so it is not in
-    the terminal mode. Both times, the reason for a refusal is that the mode is changing.
+    First, the robot is at rest, but the driver has to write its settings before the terminal mode.
+    Later, the mode was written, but messages of the normal mode arrive. They show that the board is
+    not in the terminal mode.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)
@@ -368,9 +370,11 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
-    """The user changes the drive mode, sets a terminal mode, and then sets ``host`` again.
+    """The user changes the drive mode, sets a terminal mode, and takes the terminal mode back.
 
-    The driver still stops the robot before the other drive mode begins, and says so.
+    Each of the two modes begins only when the robot has been stopped. So the driver still stops the
+    robot before the other drive mode begins. Until then, its reason for refusals names only the
+    drive mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

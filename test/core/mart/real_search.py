@@ -4,8 +4,8 @@
 
 A *trial* is one run of driver and server. In most trials, a user commands a sequence of *wishes*,
 such as "forward" or "stop", and the network disturbs a single datagram. The *fate* of this datagram
-is one of four faults: it is lost, it is late, it arrives twice, or the IMU dies as it is sent. In
-the other trials, a driver starts while the server may be executing a command.
+is one of four: it is lost, it is late, it arrives twice, or the IMU dies when the datagram is sent.
+In the other trials, a driver starts while the server may be executing a command.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
@@ -41,7 +41,7 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""The search disturbs at most this many datagrams for each wish, in each direction.
+"""Largest number of datagrams that the search disturbs for each wish, in each direction.
 
 Each of these datagrams is disturbed in a trial of its own. Regular queries and their replies are
 not counted.
@@ -55,13 +55,13 @@ later motion is a fault of the driver.
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
-"""Commands that the server may be executing when the driver starts, one in each trial."""
+"""Commands that the server executes when the driver starts, one in each trial; empty for none."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times in s for which the network is interrupted from the driver's start on, one in each trial."""
+"""Durations in s of the first interruption of the network, at the driver's start, one per trial."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s for which the network works after the first interruption.
+"""Times in s from the end of the first interruption of the network to the start of the second.
 
-After this time, the network is interrupted again, for 1 s. A trial with 30 s ends before that.
+Each trial has one. The second interruption lasts 1 s. With 30 s, the trial ends before it.
 """
 ENDS_S, SETTLED_S = 16.0, 1.5
 

@@ -331,9 +331,9 @@ def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_mov
 
 @pytest.mark.parametrize("x_m", [1e4, 1e9, 1e60, 1e308, -1e300])
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
-    """A goal is more than 1000 m away, and its command could be too long for a request.
+    """A goal is so far away that the command for it could be too long for a request.
 
-    The driver rejects the goal. A later goal still moves the robot.
+    The limit is 1000 m, so the driver rejects the goal. A later goal still moves the robot.
     """
     bench = MartBench().ready()
     with pytest.raises(CommandRefused, match="the limit is 1000 m"):

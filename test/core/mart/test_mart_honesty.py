@@ -14,8 +14,8 @@ pytestmark = pytest.mark.slow
 def test_odometry_is_no_farther_off_than_its_covariance_says(network: str) -> None:
     """The robot makes drives of all kinds, with motors that differ by up to 4 %.
 
-    The error of the odometry fits its covariance. The network that is only late is not tested,
-    because the worst network is as late, and also loses and duplicates datagrams.
+    The error of the odometry fits its covariance. One network only delays datagrams. It is not
+    tested, because the worst network delays them as much, and also loses and duplicates datagrams.
     """
     drives = [list(drive(NETWORKS[network], seed)) for seed in range(3)]
     every = [value for each in drives for value in each]

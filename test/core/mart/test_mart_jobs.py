@@ -80,8 +80,8 @@ def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
     """Without a dock, the robot drives at most the permitted distance.
 
-    A controlled move is longer than requested, so the driver requests less. Obstacles do not stop
-    docking.
+    The server's moves go farther than requested, so the driver requests a shorter distance.
+    Obstacles do not end a docking move.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))

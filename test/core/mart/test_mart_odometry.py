@@ -21,7 +21,10 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packet
 
 WRONG_NEES = 28.0
-"""With a consistent covariance, 1 in 270,000 normalised squared errors exceeds this value."""
+"""A normalised squared error above this value is a failure of the test.
+
+If the covariance is right, only 1 in 270,000 of these errors is above it.
+"""
 
 
 def at(at_s: float, *, doubtful: bool = False) -> Moment:
@@ -31,8 +34,8 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Let the robot make two motions that end with equal encoder counts, and return the bench.
 
-    During each motion, all replies are lost, until ``quiet_s`` after the driver begins to stop the
-    motion. Check that the covariance always covers the error.
+    In each motion, no reply arrives from the start until ``quiet_s`` after the driver begins to
+    stop the motion. Check that the covariance covers the error all the time.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -77,7 +80,7 @@ def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_t
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The ok to the check of the IMU comes twice, and the start of a turn (L) is lost.
+    """The ok reply to the check of the IMU comes twice, and the start of a turn (L) is lost.
 
     The encoder count is unchanged, so the second ok does not confirm the turn.
     """
@@ -110,7 +113,7 @@ def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
 def reversed_by_1000() -> MartOdometry:
     """Return the odometry of a robot that has reversed by 1000 counts and begins a second motion.
 
-    The last encoder count is still that of the first motion.
+    No encoder count has arrived since the second motion began.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -154,9 +157,10 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
-    """An ok arrives after the start, but the encoder count does not change.
+    """A motion is commanded, and an ok seems to confirm it, but the encoder count does not change.
 
-    The ok was a copy, and the robot did not start.
+    So the ok was a copy of an older reply, and the robot did not start. The odometry adds no
+    motion.
     """
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
@@ -170,7 +174,7 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether a motion had begun, or None if the replies do not show this.
+    """Return whether a motion had begun before it was stopped. None: the replies do not show this.
 
     The motion is started at 8 s. The driver sends stops at 10 s and 10.3 s. ``replies``: time in s
     and bytes of each reply.
@@ -271,9 +275,9 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 
 
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
-    """A doubtful encoder count may be the reply of a sonar.
+    """A doubtful encoder count may in fact be the reply to a sonar query.
 
-    Only the third doubtful count in a row changes the pose.
+    So one doubtful count does not change the pose. Three doubtful counts in a row do.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
@@ -321,7 +325,8 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
     """The odometry is reset during a controlled move.
 
-    The count at the end includes the distance before the reset. The covariance covers this error.
+    The encoder count at the end of the move contains the whole move, also the distance before the
+    reset. So the odometry is wrong, and the covariance covers this error.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)

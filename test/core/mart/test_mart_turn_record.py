@@ -107,9 +107,9 @@ def test_only_the_first_piece_of_the_file_is_needed() -> None:
 
 @given(st.lists(st.binary(max_size=PIECE) | st.just(RECORD[:100]), max_size=4))
 def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
-    """Other files, and records whose beginning is incomplete, contain no angle.
+    """A file that is not the record of a turn, or whose beginning is incomplete, contains no angle.
 
-    They do not raise an error.
+    The driver finds no angle in such a file, and raises no error.
     """
     assert recorded_deg(pieces, MCR.request(90)) is None
 
@@ -117,9 +117,10 @@ def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("inequality", [-0.05, 0.05])
 def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequality: float) -> None:
-    """One wheel turns 5 % faster, and the server reports no heading.
+    """One wheel turns 5 % faster, and the server reports no heading. All goals are reached.
 
-    Without the records, the last goal would be missed by 0.2 m.
+    The driver learns the true angles from the records of the turns. Without these records, the
+    robot would miss the last goal by 0.2 m.
     """
     bench = MartBench("source", motor_inequality=inequality).ready()
     for goal in GOALS:
@@ -135,9 +136,10 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The server's records contain no usable angle, or the server has no records.
+    """The server has no records of its turns, or its records contain no usable angle.
 
-    The manual does not specify the records. The driver requests only three of them.
+    This is possible, because the manual does not specify the records. After three requests for a
+    record, the driver requests no more. The robot still reaches its goals.
     """
     bench = MartBench("source").ready()
     if missing == "angle":

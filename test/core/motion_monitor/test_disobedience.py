@@ -80,9 +80,10 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """The board sends a displacement only every 0.1 s.
+    """The board sends a displacement only every 0.1 s. The robot is still stopped within 0.3 s.
 
-    Three displacements that deviate are a fault. So the robot is still stopped within 0.3 s.
+    Three displacements that deviate from the command take 0.3 s, so the monitor must not wait for a
+    fourth.
     """
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
@@ -223,7 +224,10 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
 
 
 def test_without_the_motion_monitor_such_a_goal_is_discarded_and_the_next_one_accepted() -> None:
-    """The motion monitor is off, and the robot drives away from its goal. The driver stops it."""
+    """The motion monitor is off, and the robot drives away from its goal.
+
+    The driver discards the goal and stops the robot. It accepts the next goal.
+    """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.configure(motion_monitor=False)
     bench.go_to(-0.5, 0.0, 0.0)

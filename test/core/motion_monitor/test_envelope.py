@@ -163,9 +163,10 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """Motion is commanded, but a displacement over 0.1 s is zero. A reversal may be the cause.
+    """Motion is commanded, and a displacement over a period of 0.1 s is zero.
 
-    So only a second displacement of zero, directly after the first, proves that the robot is held.
+    The robot may have reversed in this period. So only a second displacement of zero, directly
+    after the first, proves that the robot is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -180,7 +181,8 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 def test_what_is_made_good_is_paid_for() -> None:
     """A held robot is released and moves faster than commanded, to make up for the lost distance.
 
-    The distance of this motion is subtracted from the wind-up, down to zero.
+    The wind-up is the distance that the robot may still make up for. The extra distance of the fast
+    motion is subtracted from it, down to zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

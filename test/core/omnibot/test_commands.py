@@ -109,7 +109,10 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """A velocity of whole counts is sent as these counts, unless one of their bytes is harmful."""
+    """A velocity is a whole number of LSB in each word. The frame contains exactly these numbers.
+
+    Velocities with harmful bytes are not tested, because the driver changes them.
+    """
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
     command = bare(encoder().velocity(BodyTwist(x / 70, y / 70, omega / 500)))

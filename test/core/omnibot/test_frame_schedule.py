@@ -40,9 +40,9 @@ def test_damaged_bytes_tell_how_many_imu_frames_they_were(
 
 
 def test_a_damaged_pose_is_not_an_imu_frame() -> None:
-    """A pose of 15 bytes is due, but 14 damaged bytes come, as many as an IMU frame has.
+    """A pose of 15 bytes is due. Instead, 14 damaged bytes arrive: the length of an IMU frame.
 
-    No lost IMU frame is counted.
+    They are not counted as a lost IMU frame.
     """
     rhythm = nominal(0)
     for _ in range(5):

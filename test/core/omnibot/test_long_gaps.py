@@ -20,9 +20,9 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """Frames are lost for more than 1 s. Later displacements wait for a pose of the board.
+    """All frames are lost for more than 1 s. Later displacements wait for a pose of the board.
 
-    They wait up to 0.2 s. The first published pose is then right.
+    They wait for up to 0.2 s. Therefore the first pose that the driver publishes is right.
     """
     for seed in range(5):
         on = line(seed)
@@ -98,9 +98,10 @@ def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: in
 
 
 def test_a_pose_that_does_not_correct_continues_the_motion_for_two_seconds_at_most() -> None:
-    """The robot drives at 0.25 m/s, and ``use_board_pose`` is off. A pose shows 600 lost deltas.
+    """The robot drives at 0.25 m/s, and ``use_board_pose`` is off.
 
-    Odom continues the motion for 2 s, that is 0.5 m.
+    A pose shows 600 lost deltas, which take 24 s. Odom continues the motion for only 2 s of this
+    time, that is 0.5 m.
     """
     odometry = attached(OdometrySettings(use_board_pose=False))
     step = DisplacementReading(0.01, 0.0, 0.0, "earth", PERIOD_S, 0)

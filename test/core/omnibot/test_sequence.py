@@ -41,10 +41,10 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The board is paused, and then continues with the next count. No delta is lost.
+    """The board is paused, and then continues with the next count. No delta is counted as lost.
 
-    The duration of the first delta is unknown. A restarted board begins at 0. So if the next count
-    is 0 (after 255), it is regarded as a restart.
+    The duration of the first delta is unknown. If the next count is 0 (after 255), the driver
+    assumes a restart, because a restarted board begins at 0.
     """
     sequence = begun(count)
     sequence.pause()
@@ -55,9 +55,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 @pytest.mark.slow
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """After a pause, a count can mean a restart, or lost deltas of a board that ran on.
+    """After a pause, either the board has restarted, or it ran on and deltas were lost.
 
-    The explanation with fewer lost deltas is accepted. If the numbers are equal, it is a restart.
+    The driver computes for both cases how many deltas were lost, and assumes the case with fewer.
+    If the numbers are equal, it assumes a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -151,10 +152,10 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 @pytest.mark.parametrize("poses", [6, 60, 206])
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
-    """More than 1 s of deltas are lost, and then a pose arrives before the next delta.
+    """Deltas are lost for more than 1 s. Then a pose arrives before the next delta.
 
-    The pose shows the losses. By chance, five times its count may be near the count of the last
-    delta, as after a restart. After such a long gap, this is not taken for a restart.
+    The counter of the pose shows the losses. By chance, five times this counter may be near the
+    count of the last delta, as after a restart. After such a long gap, no restart is assumed.
     """
     sequence = Sequence()
     for count in range(300):
@@ -218,7 +219,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
     """The board's pose counter begins at 0 again, after only 1 s. No pose is counted as lost.
 
-    For a wrap of the counter, more poses would have to be lost than the board sends in 1 s.
+    In 1 s, the board sends too few poses for a wrap of this counter.
     """
     sequence = Sequence()
     for count in range(25):

@@ -2,7 +2,7 @@
 
 """Tests that the simulated Fejemis moves according to the manual's equations.
 
-This motion differs from the one that ``rc`` commands.
+In these equations, the robot's speed and turn rate differ from the numbers in the ``rc`` line.
 """
 
 from math import atan2, degrees, hypot, radians

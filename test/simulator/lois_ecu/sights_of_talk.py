@@ -172,7 +172,11 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """Return whether a second request for a ball is ignored, but a third one 6 s later is not."""
+    """Return whether the board delivers only one ball in six seconds.
+
+    With this quirk, it ignores a request that directly follows another request, but obeys a request
+    6 s later.
+    """
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())
@@ -277,7 +281,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 def slow_boot(quirks: Quirks) -> bool:
     """Return whether the board, in the first 2 s after power-up, sends nothing and obeys nothing.
 
-    A command that it receives in this time is obeyed afterwards.
+    The board does not lose a command from this time: it obeys the command afterwards.
     """
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))

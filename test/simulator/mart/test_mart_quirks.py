@@ -76,7 +76,8 @@ def left_spin_in_reference_move(quirks: Quirks) -> bool:
 def moves_wait_for_imu(quirks: Quirks) -> bool:
     """Return whether a drive (F) waits for a missing IMU.
 
-    It is not answered, and starts when the IMU is back.
+    The server then does not answer F at first. When the IMU is back, the server answers F, and the
+    robot drives.
     """
     rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
     rig.say("F")
@@ -216,7 +217,7 @@ def probe_turns(quirks: Quirks) -> bool:
 def heading_starts_off(quirks: Quirks) -> bool:
     """Return whether a second forward drive, long after the first, begins with a wrong heading.
 
-    A right heading is zero at the beginning.
+    The right heading at the beginning of a drive is zero.
     """
     rig = Rig(quirks)
     for _ in range(2):
@@ -228,7 +229,10 @@ def heading_starts_off(quirks: Quirks) -> bool:
 
 
 def corrects_after_stop(quirks: Quirks) -> bool:
-    """Return whether the robot still turns a little after one of forty straight moves has ended."""
+    """Return whether, after the end of a straight move, the robot still turns a little.
+
+    This does not happen after every move, so up to forty moves are tried.
+    """
     rig = Rig(quirks, dead_zone_units=0.0)
     for _ in range(40):
         assert rig.ask("TF 12").startswith("ok")
@@ -254,14 +258,17 @@ def test_every_quirk_has_its_sight() -> None:
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """If a quirk is on, its detector finds it. If only this quirk is off, the detector does not."""
+    """If a quirk is on, its detector finds it.
+
+    If this quirk is off and the other quirks of the firmware are on, its detector does not find it.
+    """
     assert SEEN[name](replace(FIRMWARE, **{name: True}))
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
-    """On a server as in the manual, all quirks are off. No detector finds its quirk."""
+    """A server that follows the manual has no quirks. No detector finds its quirk."""
     assert not SEEN[name](DOCUMENTED)
 
 
@@ -290,7 +297,7 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """A command has too few numbers. With a quirk, this crashes the server; here the quirk is off.
+    """A command has too few numbers, and the quirk with which this crashes the server is off.
 
     The server replies that the command's format is wrong, and then answers HELLO.
     """
@@ -302,7 +309,7 @@ def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> No
 
 
 def test_a_documented_server_stops_at_a_wall() -> None:
-    """A server as in the manual stops the robot before the robot hits a wall."""
+    """A server that follows the manual stops the robot before the robot hits a wall."""
     for start, stop, answer in (
         ("F", "SM", "fail insufficent clearence"),
         ("RM 30", "SRM", "fail insufficient clearance"),
@@ -315,7 +322,7 @@ def test_a_documented_server_stops_at_a_wall() -> None:
 
 
 def test_a_documented_server_stops_when_its_imu_dies() -> None:
-    """The IMU dies during a motion. A server as in the manual stops the robot."""
+    """The IMU dies during a motion. A server that follows the manual stops the robot."""
     for start in ("F", "RM 30", "R"):
         rig = Rig(DOCUMENTED, imu_dies_s=1.0)
         rig.drive(start, 5.0)
@@ -326,7 +333,7 @@ def test_a_documented_server_stops_when_its_imu_dies() -> None:
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
     """A controlled move is stopped 0.02, 0.12 or 1 s after its start.
 
-    A server as in the manual replies to the move within 1 s.
+    A server that follows the manual replies to the move within 1 s, and the robot is at rest.
     """
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):

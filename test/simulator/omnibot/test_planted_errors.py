@@ -79,7 +79,10 @@ def test_each_motor_has_its_own_constants() -> None:
 
 
 def test_a_motors_delay_holds_its_effort_back() -> None:
-    """A motor with a delay of three ticks moves like one without it, but three ticks later."""
+    """Two motors get the same effort, and one of them has a delay of three ticks.
+
+    The motor with the delay moves like the other one, but three ticks later.
+    """
     prompt, late = Motor(), Motor(MotorConstants(delay_ticks=3))
     turned = [prompt.advance(500.0) for _ in range(10)]
     assert [late.advance(500.0) for _ in range(10)] == [0.0, 0.0, 0.0, *turned[:7]]

@@ -41,7 +41,10 @@ def test_a_pose_moves_at_the_mean_heading_of_the_step() -> None:
 
 
 def drive(settings: BoardSettings, ticks: int = 300) -> World:
-    """Return the world after all wheels have turned forward, so that the robot turned clockwise."""
+    """Drive all wheels forward for this number of ticks, and return the world.
+
+    This turns the robot clockwise on the spot.
+    """
     world = World(settings)
     for _ in range(ticks):
         world.advance((1000.0, 1000.0, 1000.0))
@@ -71,7 +74,7 @@ def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
     """The slip of the wheels is random, depends on the seed, and is 10 % on average.
 
-    The robot turns by 90 % of the encoders' angle.
+    So the robot turns by only 90 % of the angle that the encoders show.
     """
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
@@ -119,9 +122,9 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """Someone moves the robot by hand. The motors have no effect, but the encoders count.
+    """Someone moves the robot by hand. The motors cannot move it, but the encoders count.
 
-    Afterwards the motors work from the new place.
+    When the robot is released, the motors move it again, from its new place.
     """
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
