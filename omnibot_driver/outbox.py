@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls at which the queue is full. A thread that calls ``deliver`` while the
-queue is full waits until another thread has made these calls."""
+"""Number of queued calls at which the queue is full. If the queue is full, a thread that calls
+``deliver`` waits until another thread has made the queued calls."""
 
 Delivery = Callable[[], object]
 
@@ -71,7 +71,8 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Let the ``serve`` thread make the queued calls, so that the caller is not delayed."""
+        """Let the thread that runs ``serve`` make the queued calls, so the caller is not delayed.
+        """
         if self._waiting:
             self._handed_over.set()
 

@@ -50,7 +50,7 @@ def imported(path: Path) -> set[str]:
     ids=lambda path: str(path.relative_to(PACKAGE)),
 )
 def test_common_code_imports_no_board(path: Path) -> None:
-    """All common code, such as session, link and node, imports no module of a particular board."""
+    """No common code, such as session, link and node, imports a module of a particular board."""
     known = {
         f"omnibot_driver.{place}.{name}" for place in ("core", "boards") for name in boards.PROFILES
     }
@@ -139,8 +139,8 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
     """The description of ``gyro_bias`` says that ``~/calibrate_gyro`` measures this bias.
 
-    If the board itself subtracts the bias, the description does not say this. Only the OmniBot's
-    parameter table quotes the noise of an IMU.
+    If the board itself subtracts the bias, the description must not say this. The noise of an IMU
+    is quoted only in the parameter table of the OmniBot.
     """
     profile = boards.load(name)
     traits = profile.make(boards.check_all({"board": name})).traits

@@ -170,7 +170,7 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 
 
 def test_only_its_own_urls_are_taken() -> None:
-    """Only URLs that begin with ``replay:`` are recordings, not device names or other URLs."""
+    """A URL that begins with ``replay:`` is a recording. A device name or another URL is not."""
     assert is_recording("replay://x")
     assert not is_recording("/dev/replay")
     assert not is_recording("sim://")

@@ -45,13 +45,13 @@ def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("latency", ["1\n", "5\n", "", "soon\n"])
 def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, latency: str) -> None:
-    """The check gives no message for a short latency timer or one whose value is unreadable."""
+    """The latency timer is short, or its value is unreadable. The check gives no message."""
     assert selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", latency)) == ""
 
 
 @pytest.mark.parametrize("port", ["/dev/ttyACM0", "/dev/pts/3", "socket://host:1", "sim://", ""])
 def test_a_port_without_such_a_timer_is_left_alone(tmp_path: Path, port: str) -> None:
-    """A port without a latency timer, such as a pseudo-terminal or a URL, leads to no message."""
+    """A pseudo-terminal or a URL, for example, has no latency timer. The check gives no message."""
     assert selfcheck.latency_advice(port, adapter(tmp_path, "ttyUSB0", "16\n")) == ""
 
 
@@ -122,7 +122,10 @@ def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, wa
 def test_a_node_of_the_same_full_name_is_told_of(
     others: list[tuple[str, str]], warned: bool
 ) -> None:
-    """Another node of the same full name is reported, but not a node in another namespace."""
+    """Another node with the same full name is reported.
+
+    A node with the same name in another namespace is not reported.
+    """
     publishers = [
         SimpleNamespace(node_namespace=namespace, node_name=name)
         for namespace, name in [("/", "omnibot_driver"), *others]
@@ -136,9 +139,9 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """Some publishers of cmd_vel use the wrong message type. The warning names only these.
+    """Only some publishers of cmd_vel use the wrong message type. The warning names them.
 
-    Depending on a parameter, either type can be the wrong one.
+    A parameter decides which of the two types is the right one.
     """
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert selfcheck.type_conflict([teleop], stamped=False) == ""

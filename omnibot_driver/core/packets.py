@@ -9,7 +9,7 @@ datagram.
 from typing import Final
 
 Packet = tuple[int, bytes]
-"""Number of the channel, and the bytes."""
+"""A pair: the number of the channel, and the bytes."""
 Packets = tuple[Packet, ...]
 """Packets in the order in which they are sent."""
 

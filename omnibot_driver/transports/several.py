@@ -128,10 +128,11 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """Write each packet to its line. Bytes that a line does not accept at once are sent later.
+        """Write each packet to its line.
 
-        If a line has had waiting bytes for 0.2 s without a break, the bytes are discarded, and the
-        line is regarded as missing. A missing line gets only the bytes that it accepts at once.
+        Bytes that a line does not accept at once wait, and are sent later. If a line always has
+        waiting bytes for 0.2 s, these bytes are discarded, and the line is regarded as missing. A
+        missing line gets only the bytes that it accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -283,9 +284,9 @@ class Line:
         self._overruns = 0
 
     def write(self, data: bytes, now: float) -> bool:
-        """Write the waiting bytes, then ``data``; return False if bytes waited too long.
+        """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
 
-        A missing line gets only the bytes that it accepts at once.
+        If the line is missing, write only the part of ``data`` that the port accepts at once.
         """
         if self.port is None:
             return True
@@ -298,7 +299,7 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if bytes have waited for 0.2 s without a break.
+        """Write waiting bytes; return False if there were always waiting bytes in the last 0.2 s.
 
         Before it returns False, the method discards all unsent bytes.
         """

@@ -49,7 +49,10 @@ def told(piece: int, lost: float) -> str:
 @pytest.mark.parametrize("lost", LOST)
 @pytest.mark.parametrize("piece", PIECES)
 def test_both_cores_say_the_same(piece: int, lost: float) -> None:
-    """The compiled core here and the interpreted core in another process give the same digest."""
+    """The compiled and the interpreted core give the same digest of a session's events and bytes.
+
+    The compiled core runs in this process, the interpreted core in another one.
+    """
     path = os.pathsep.join(str(ROOT / part) for part in (".", "test", "test/core"))
     script = f"import test_compiled as t; print(t.core_kind(), t.told({piece}, {lost}))"
     done = subprocess.run(

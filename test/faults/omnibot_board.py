@@ -48,7 +48,8 @@ def never_sent(
 def lossy(number: int) -> BoardSettings:
     """Return settings of a board behind a line that loses bytes.
 
-    ``number``: selects how the board finds frames, and whether it obeys an emergency stop.
+    ``number``: number of the board. It determines how the board finds frames, and whether it obeys
+    an emergency stop.
     """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)

@@ -22,13 +22,13 @@ class RigBoard:
 
     ``old_command``: the bytes of a motion command, with which tests fill the port.
 
-    ``stop``: the last bytes to the board when a driver ends.
+    ``stop``: the last bytes that the board gets when a driver ends.
 
-    ``opening``: the first bytes to the board after its port is opened.
+    ``opening``: the first bytes that the board gets after its port is opened.
 
-    ``tuning``: parameters that must refuse invalid values.
+    ``tuning``: names of parameters. The driver must refuse invalid values of them.
 
-    ``off_within_s``: longest time from a stop until the motors are off.
+    ``off_within_s``: longest time from the driver's stop command until the motors are off.
 
     ``old_bytes_s``: time that the board needs to receive all old commands from a full port.
 
@@ -44,18 +44,20 @@ class RigBoard:
 
     ``sent``: returns the frames of the board's last tick.
 
-    ``not_sent``: returns (kind of message, number never sent, number published).
+    ``not_sent``: compares the published messages with the frames that the board has sent. For each
+    kind of message, it returns the kind, the number of published messages that the board has not
+    sent, and the number of all published messages.
 
     ``lossy``: returns the settings of the n-th board behind a lossy line.
 
-    ``line``, ``serve``: make the board's line and its server. ``None`` means a serial line on a
-    terminal.
+    ``line``, ``serve``: functions that make the board's line and its server. ``None`` means a
+    serial line on a terminal.
 
     ``cases``: returns the faults of the n-th round. ``None`` means the faults of a serial line.
 
     ``steps``: faults of a random walk. ``None`` means the faults of a serial line.
 
-    ``without``: faults and parts of the campaign that do not apply.
+    ``without``: faults and parts of the campaign that do not apply to this board.
     """
 
     name: str

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of each kind of stop on a line that loses bytes. ``make faults`` has more."""
+"""Tests of each kind of stop on a line that loses bytes. ``make faults`` runs more such tests."""
 
 from pathlib import Path
 

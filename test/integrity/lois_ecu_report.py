@@ -2,8 +2,9 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board shares no code with the driver. Decoded and true reports are compared in order.
-A decoded report is right if it equals any true report after the last one that was found.
+The simulated board shares no code with the driver. The decoded reports are compared with the true
+reports, in order. A decoded report is right if a true report equals it. This true report must come
+after the one that the previous right report equals.
 """
 
 from collections import Counter

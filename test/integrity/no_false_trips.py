@@ -18,7 +18,10 @@ SECONDS_EACH = 300.0
 
 
 def main() -> int:
-    """Drive all robots and print what happened. Return 1 if the monitor stopped a robot, else 0."""
+    """Drive all robots and print what happened.
+
+    Return 1 if the monitor stopped a robot; otherwise 0.
+    """
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--hours", type=float, default=10.0)
     arguments.add_argument("--first", type=int, default=0)

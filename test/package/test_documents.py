@@ -36,7 +36,7 @@ sys.exit(main(sys.argv[1:]))
 """
 """Code that runs Sphinx without the index for the search, and without garbage collection.
 
-Both would take a quarter of the time.
+The index and the garbage collection would take a quarter of the time of a build.
 """
 
 

@@ -297,9 +297,9 @@ def test_on_a_terminal_the_monitor_shows_it() -> None:
 
 
 def test_a_signal_on_the_way_ends_it_cleanly() -> None:
-    """SIGINT arrives during the drive. The demo prints its result, exits with 0, leaves no process.
+    """SIGINT arrives during the drive. The demo prints its result and exits with code 0.
 
-    The next test sends SIGTERM.
+    No process of the demo is left. The next test sends SIGTERM.
     """
     with running_demo() as (process, mark):
         read_until_it_drives(process)
@@ -312,7 +312,7 @@ def test_a_signal_on_the_way_ends_it_cleanly() -> None:
 
 
 def test_who_ends_it_before_it_drives_is_told_so() -> None:
-    """SIGTERM ends the demo before the robot has driven. The demo prints one line about this."""
+    """SIGTERM ends the demo before the robot has driven. The demo's last line says this."""
     with running_demo() as (process, mark):
         assert process.stdout is not None
         for line in process.stdout:

@@ -234,9 +234,9 @@ def test_a_prefix_without_its_slash_is_told_at_the_start(
 def test_who_does_not_want_transforms_hears_nothing_of_tf(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """The parameter ``publish_tf`` is false. The driver does not warn that tf2_ros is missing.
+    """The parameter ``publish_tf`` is false, so the driver does not warn that tf2_ros is missing.
 
-    It still warns of simulated time on a real port.
+    The driver still gives other warnings, for example about simulated time on a real port.
     """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but the board on /dev/null runs in real time")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``calibrate step``: it finds the planted constants of a wheel in its encoder deltas."""
+"""Tests of ``calibrate step``, which finds the constants of a wheel by its encoder deltas."""
 
 from dataclasses import replace
 
@@ -57,9 +57,9 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
 def test_a_motor_is_found_in_the_manuals_loop(
     pwm_per_count: float, lag_s: float, delay_s: float, seed: int
 ) -> None:
-    """A motor runs in the manual's control loop.
+    """A motor runs in the manual's control loop. The fit finds its parameters.
 
-    Its parameters are found within five claimed sigmas. A model of first order does not fit better.
+    The errors are less than five claimed sigmas. A model of first order does not fit better.
     """
     planted = (1.0, pwm_per_count, lag_s, delay_s)
     steps = made_up(motor_model(MANUAL), planted, seed)

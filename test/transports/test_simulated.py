@@ -45,7 +45,7 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
 def test_it_needs_no_guard_and_no_kernel() -> None:
     """A simulated board ends with the driver's process, so it needs no guard.
 
-    The transport has no file descriptors and counts no overruns.
+    Its transport has no file descriptors. It does not count overruns.
     """
     with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
@@ -68,7 +68,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
     assert board.read(PATIENCE_S) == (0, b"")
     canceller.join()
     board.cancel()
-    assert board.read(PATIENCE_S) == (0, b""), "if no read waits, ``cancel`` ends the next one"
+    assert board.read(PATIENCE_S) == (0, b""), "if no read waits, ``cancel`` ends the next read"
 
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:

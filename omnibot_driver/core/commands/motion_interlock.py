@@ -2,8 +2,8 @@
 
 """The motion interlock: refuses motion after the motion monitor has stopped the robot.
 
-This module knows when commands and stops happened. It does not know the reason for a stop, nor what
-is commanded. Time is an argument.
+In this module, a stop is a stop by the motion monitor. The module knows when commands and stops
+happened. It does not know the reason for a stop, nor what is commanded. Time is an argument.
 """
 
 import math
@@ -31,7 +31,7 @@ class Until(Enum):
 
 
 class MotionInterlock:
-    """Whether motion is refused after a stop by the motion monitor, and until when.
+    """The refusal of motion after a stop by the motion monitor.
 
     * ``until``: what ends the refusal.
     * ``starts``: whether the board supports ~/start.
@@ -57,23 +57,24 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        On a board without ~/start, this ends the refusal of motion after a second stop within 60 s.
-        It does not end a refusal after a first stop, or a refusal that only ~/start can end.
+        On a board without ~/start, this ends the refusal of motion after the monitor's second stop
+        within 60 s. It does not end the refusal after a first stop, or a refusal that only ~/start
+        can end.
         """
         if self.until is Until.ESTOP:
             self.start()
 
     def expire(self, now: float, timeout_s: float) -> None:
-        """End the refusal after a first stop if no command has arrived for ``timeout_s``."""
+        """End the refusal after a first stop if ``timeout_s`` has passed without a command."""
         if self.until is Until.RELEASE and not self.reason(now, timeout_s):
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
         """Record that a sender of commands was active at ``now``.
 
-        A refusal after a first stop ends after ``timeout_s`` without commands. If this time is not
-        over yet, it begins again at ``now``. Call this when a command is refused, and after a stall
-        of this process.
+        The refusal after a first stop by the monitor ends after ``timeout_s`` without commands. If
+        the refusal has not ended yet, this method begins the waiting time again at ``now``. Call it
+        when a command is refused, and after a stall of this process.
 
         ``stalled_s``: length of the stall, in s. A stall does not count as time without commands.
         """
@@ -85,8 +86,9 @@ class MotionInterlock:
 
         ``stands``: whether the command is to stand still, which is always allowed.
 
-        ``timeout_s``: time without commands, in s, that ends the refusal after a first stop. It
-        does not end the refusal after a second stop within 60 s.
+        ``timeout_s``: time without commands, in s, after which motion is allowed again, if the
+        motion monitor has stopped the robot once. After a second stop within 60 s, this time does
+        not help.
         """
         reason = "" if stands else self.reason(now, timeout_s)
         if not stands:

@@ -100,8 +100,9 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        If that is impossible, the robot is stopped. With the new settings, a command to stand still
-        may become a motion. Such a command is dropped, because it was not checked as a motion.
+        If the command cannot be encoded, the robot is stopped. With the new settings, a command to
+        stand still may become a motion. Such a command is dropped, because it was not checked as a
+        motion.
         """
         current = self.policy.current
         if current is None:
@@ -169,7 +170,7 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Let the motion monitor expect that the robot follows the set-point that was just sent."""
+        """Tell the motion monitor the newest set-point, which the robot should follow now."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -182,7 +183,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Check the number of rejected displacements since the driver began; return notices.
+        """Check how many displacements were rejected since the driver began; return notices.
 
         Several rejected displacements in a row show that the robot does not move as commanded.
         """
@@ -196,7 +197,8 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion comes from the newest estimate, or from ``reading`` if the estimate has none.
+        The motion is taken from the newest estimate. If this estimate has no motion, it is taken
+        from ``reading``.
         """
         if not reading.possible:
             return self._monitor.count_impossible(now)
@@ -248,8 +250,9 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only a discarded goal gives a notice, because a goal is sent only once. A velocity is sent
-        repeatedly, and the refusal of the next command is reported.
+        Only the loss of a goal gives a notice, because the user sends a goal only once. A velocity
+        command needs no notice: it is sent repeatedly, and the user is told when the next one is
+        refused.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
@@ -261,9 +264,10 @@ class CommandPipeline:
         ]
 
     def end_goal(self, now: float) -> list[str]:
-        """Drop the goal because of a zero ``cmd_vel`` that was refused; return notices.
+        """Drop the goal because of a zero ``cmd_vel``, although that command was refused.
 
-        The goal stays if the board's control switch does not permit velocities at all.
+        Return notices. The goal stays if the board's control switch does not permit velocities at
+        all.
         """
         current = self.policy.current
         if not isinstance(current, GoalSetpoint) or not self.shaper.takes_velocities:

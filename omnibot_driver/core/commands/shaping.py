@@ -60,7 +60,10 @@ class CommandShaper:
         return self._control != "position"
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
-        """Return the set-point for a body velocity. ``before`` is the set-point to replace."""
+        """Return the set-point for a body velocity.
+
+        ``before``: the set-point that the new one will replace.
+        """
         if not self.takes_velocities:
             raise self._at_odds(Authority.BASE)
         limited = feasible = self.kinematics.feasible(twist)

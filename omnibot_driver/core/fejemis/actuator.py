@@ -2,8 +2,8 @@
 
 """Sends the motion lines (``rc``) to both boards, and repeats them.
 
-While the speed is limited, or lines have no checksum, each new angle of the front wheel causes an
-extra repetition.
+Each new measured angle of the front wheel causes an extra repetition in two cases: while this angle
+limits the speed, and while lines have no checksum.
 
 The module knows when a line is due; it does not know what the line contains.
 """
@@ -56,7 +56,7 @@ class PairStream(SetpointStream):
     def angle_told(self, angle_rad: float, now: float) -> bool:
         """Receive the front wheel's angle in rad; return whether a new fault of the wheel is found.
 
-        The fault: the wheel does not follow its commanded angle.
+        The fault is that the wheel does not follow its commanded angle.
         """
         if self.driving and self._pair.restless:
             self._said_at = -math.inf

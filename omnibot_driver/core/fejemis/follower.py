@@ -12,7 +12,8 @@ import math
 from typing import Final
 
 FOLLOWS_WITHIN_S: Final = 1.0
-"""If the front wheel comes no nearer to its commanded angle for this time in s, it has a fault."""
+"""Time in s within which the front wheel must come nearer to its commanded angle. If it does not,
+it has a fault."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
 """Tolerated deviation of the front wheel from its commanded angle, in rad, while the robot drives.

@@ -24,39 +24,44 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""If the second line of a pair arrives this time in s or more after the first line, the pair may be
-false. It must then wait for the next pose."""
+"""Shortest time in s between the two lines of a pair at which the pair may be false. Such a pair
+must wait for the next pose."""
 SILENT_S: Final = 0.1
-"""Silence in s after which a pair must wait for the next pose, even if its lines come together.
+"""Length in s of a silence after which a new pair must wait for the next pose. This is so even if
+the two lines of the pair come close together.
 
-The pose shows whether the board was silent, or the host only read late. If the board was silent,
-the sampling time of the pair is unknown, so the pair is rejected.
+The pose shows whether the board was silent, or whether the host only read late. If the board was
+silent, the sampling time of the pair is unknown, so the pair is rejected.
 """
 WARY_S: Final = 1.0
-"""For this time in s after a stall of the driver, every pair must wait for the next pose. During
-the stall, the kernel's buffer may have overflowed. Lines were then lost without a silence."""
+"""Time in s after a stall of the driver in which every pair must wait for the next pose. During the
+stall, the kernel's buffer may have overflowed. Lines are then lost, although the driver sees no
+silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits, in s, for a difference: the sum of the intervals before gyro lines, minus the sum of the
-intervals before acceleration lines. Each interval begins at the previous line of the other kind.
+"""Limits, in s, of the difference between two sums. The first sum is that of the intervals before
+gyro lines, the second that of the intervals before acceleration lines.
 
-The interval between two samples is longer than the interval within a sample. So the sign of the
-difference shows which line of a sample comes first, if the magnitude is at least ``KNOWN_S``.
-``SUREST_S``: largest magnitude that is stored.
+Each interval begins at the previous line of the other kind. The interval between two samples is
+longer than the interval within a sample. So the sign of the difference shows which line of a sample
+comes first.
+
+``KNOWN_S``: smallest magnitude of the difference at which its sign is used. ``SUREST_S``: largest
+magnitude that is stored.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to an interval before a gyro or acceleration line, if a line of another
-kind arrives in this interval. Such an interval is probably between two samples."""
+"""Time in s that is added to an interval between a gyro and an acceleration line if a line of
+another kind arrives in this interval. Such an interval is probably between two samples."""
 PATIENCE: Final = 60
-"""After this many intervals, it is decided which line of a sample comes first, even if the
-difference is below ``KNOWN_S``. The difference stays small if the two lines are half a period
-apart."""
+"""Number of intervals after which the order of a sample's two lines is decided in any case. The
+difference of the two sums may then be below ``KNOWN_S``. It stays that small if the two lines are
+half a period apart."""
 MOST: Final = 10
-"""Largest magnitude of a counter that shows whether lines of another kind usually come between
-pairs (positive) or within pairs (negative). Each kind has its own counter."""
+"""Largest magnitude of a counter. The counter shows whether lines of one other kind usually come
+between pairs (positive) or within pairs (negative). Each of these kinds has its own counter."""
 UNPOSED: Final = 20
-"""How many gyro lines, or how many acceleration lines, may come after the last pose while a pair
-waits for the next pose. If more come, the pair is rejected."""
+"""Largest number of gyro lines, or of acceleration lines, that may arrive after the last pose while
+a pair waits for the next pose. If more arrive, the pair is rejected."""
 
 
 @dataclass(slots=True)
@@ -103,8 +108,8 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """Sum of the intervals before gyro lines minus those before acceleration lines, in s. If it
-        is positive, the gyro line of a sample comes first."""
+        """The sum of the intervals before gyro lines, minus the sum of the intervals before
+        acceleration lines, in s. If it is positive, the gyro line of a sample comes first."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -136,10 +141,12 @@ class ImuPairs:
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
+        """Receive a line that is neither a gyro nor an acceleration line.
 
-        If the first line of a pair has arrived, but not the second, the second is regarded as lost.
-        This does not apply if lines of this ``kind`` usually come within pairs.
+        ``kind``: the keyword of the line.
+
+        If a pair is incomplete at this moment, its second line is regarded as lost. There is one
+        exception: lines of this ``kind`` usually come within pairs.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -155,8 +162,9 @@ class ImuPairs:
         """Receive the board's time of a pose, and accept or reject all pairs that still wait.
 
         The time since the previous pose shows how many gyro and acceleration lines were sent. If
-        lines of both kinds are missing, any of the pairs may be false, so all are rejected. The
-        same holds for the first pose, and for a pose with an earlier time than the previous one.
+        lines of both kinds are missing, any of the pairs may be false, so all waiting pairs are
+        rejected. They are also rejected at the first pose, and at a pose whose time is before that
+        of the previous pose.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
@@ -248,15 +256,16 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Count lines of these ``kinds``, to learn whether a kind comes between or within pairs.
+        """Count lines, to learn whether lines of a kind usually come between or within pairs.
 
-        ``step``: 1 if they came between pairs, -1 if they came within a pair.
+        ``kinds``: the kinds of the lines. ``step``: 1 if the lines came between pairs, -1 if they
+        came within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 
     def _learn(self, kind: Kind, pause_s: float, *, marked: bool) -> None:
-        """Learn which line of a sample comes first: the line after the longer intervals."""
+        """Learn which line of a sample comes first: the one with the longer interval before it."""
         evidence_s = min(max(pause_s, 0.0), PERIOD_S) + (MARKED_S if marked else 0.0)
         self._evidence_s += evidence_s if kind == "gyro" else -evidence_s
         self._evidence_s = max(-SUREST_S, min(SUREST_S, self._evidence_s))

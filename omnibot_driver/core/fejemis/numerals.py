@@ -17,8 +17,8 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""The power of ten of a number's first digit is at least ``SMALLEST``, and less than ``LARGEST``.
-"""
+"""``SMALLEST``, ``LARGEST``: range of the power of ten of a number's first digit. ``SMALLEST`` is
+in the range, ``LARGEST`` is just above it."""
 
 
 @cache

@@ -37,7 +37,7 @@ class Obedience:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection. A latched e-stop and a requested pause stay in force."""
+        """Begin a new connection. A latched e-stop and a requested pause remain in effect."""
         self.source: float | None = None
         self._released_at = -math.inf
         self.start_at = math.inf
@@ -62,15 +62,15 @@ class Obedience:
     def pause(self) -> None:
         """Record that the user requested a pause.
 
-        If ``start`` was due after an e-stop, it is no longer due.
+        If ``start`` was due because an e-stop was released, it is no longer due.
         """
         self.pause_said = True
         self.start_at = math.inf
 
     def release(self, now: float) -> None:
-        """Release the driver's e-stop; ``start`` becomes due if the board obeyed before the e-stop.
+        """Release the driver's e-stop. ``start`` becomes due if the board obeyed before the e-stop.
 
-        After a requested pause, ``start`` does not become due.
+        After a pause that the user requested, ``start`` does not become due.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf

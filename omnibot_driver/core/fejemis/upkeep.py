@@ -126,7 +126,10 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """Why the robot must not be driven while a new board is being configured; else empty."""
+        """Why the robot must not be driven now: a board's configuration is still being written.
+
+        Empty if no configuration is being written.
+        """
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (

@@ -87,11 +87,14 @@ class LoisDecoder:
 
     @property
     def in_record(self) -> bool:
-        """Whether lines of a record are arriving."""
+        """Whether a record has begun to arrive and is not complete yet.
+
+        A record consists of the samples that the user requested, such as times between ticks.
+        """
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with ``left`` and ``right`` samples. Every other record is discarded."""
+        """Expect a record with ``left`` and ``right`` samples. All other records are discarded."""
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
@@ -101,7 +104,8 @@ class LoisDecoder:
     def feed(self, data: bytes, now: float) -> list[Report]:
         """Return the reports that ``data`` completes, in the order of sending.
 
-        With empty ``data``, return the held report if it has waited long enough.
+        A report that may be complete is held back until the next line shows its end. With empty
+        ``data``, return the report that is held back, if no line has come for long enough.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))
@@ -118,7 +122,10 @@ class LoisDecoder:
         return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
-        """Return the report that was held back, if it is complete. Called when the port closes."""
+        """Return the report that ``feed`` holds back, if it is complete.
+
+        Called when the port closes.
+        """
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0

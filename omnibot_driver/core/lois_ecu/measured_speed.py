@@ -27,16 +27,15 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""When a wheel starts, the board's odometry (0x20) misses a part of the wheel's motion.
-``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation of this part, in ticks."""
+"""``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
+that the board's odometry (0x20) misses each time a wheel starts."""
 FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""If a wheel is faster than ``FAST_TICKS_PER_S``, the board's odometry (0x20) misses some motion.
+"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses while a
+wheel is faster than ``FAST_TICKS_PER_S``.
 
-``LOST_TICKS``: variance of the missed motion, in squared ticks per s.
-
-While the board sends, it notices ticks late. If the next tick comes soon after a late one, the
-board measures no speed.
+The cause: while the board sends, it notices ticks late. If the next tick comes soon after a late
+one, the board measures no speed.
 """
 
 

@@ -2,8 +2,8 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-All settings are written several times (in rounds). They are confirmed when a requested date has
-arrived, and ticks arrive with the requested period.
+All settings are written several times (in rounds). The driver also requests the GPS date. The
+settings are confirmed when a date has arrived, and ticks arrive with the set period.
 """
 
 import math
@@ -39,14 +39,14 @@ AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting, for example for the
 LED. It is shorter than the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s from a tick report to the next round of settings, or to a request for a date. They
-are used in turn. The board cannot receive while it sends. After a constant delay, the board might
-be sending each time."""
+"""Delays in s from a tick report to the next round of settings, or to a request for a date. The
+delays are used in turn, because the board cannot receive while it sends. With a constant delay,
+each round could fall into a time in which the board sends."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
-period."""
+"""Largest accepted difference between the measured and the set period of the tick reports, as a
+fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
-"""Shortest time in s between two requests for an unknown date."""
+"""Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
@@ -79,7 +79,10 @@ class SettingsWriter:
 
     @property
     def confirmed(self) -> bool:
-        """Whether the board has sent a requested date, and sends ticks with the set period."""
+        """Whether the settings are confirmed.
+
+        A GPS date has then arrived, and ticks arrive with the set period.
+        """
         return self._answered and self._in_period
 
     @property
@@ -89,8 +92,11 @@ class SettingsWriter:
 
     @property
     def ignored(self) -> bool:
-        """Whether the board seems to ignore the settings: they were sent in twice the usual number
-        of rounds, and it has not confirmed them."""
+        """Whether the board seems to ignore the settings.
+
+        The settings were then sent in twice the usual number of rounds, and are still not
+        confirmed.
+        """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
 
     @property
@@ -151,7 +157,10 @@ class SettingsWriter:
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ask_date(self, now: float) -> None:
-        """Request one date, if dates do not come periodically and no request was sent recently."""
+        """Request one GPS date.
+
+        Do nothing if dates come periodically, or if a date was requested recently.
+        """
         if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now
@@ -160,7 +169,7 @@ class SettingsWriter:
         self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
     def ticks_came(self, now: float) -> None:
-        """Record the arrival of ticks, and check whether they arrive with the requested period.
+        """Record the arrival of ticks, and check whether they arrive with the set period.
 
         While the settings are unconfirmed, this method also plans the next round.
         """
@@ -177,7 +186,7 @@ class SettingsWriter:
             self._rounds_left, self._round_at_s = 1, now + away_s
 
     def date_came(self) -> None:
-        """Record that a date arrived. The date shows that the board obeys requests."""
+        """Record that a GPS date arrived. The date shows that the board obeys requests."""
         if self._rounds and not self._answered:
             self._answered = True
             # A request for one date ended the periodic sending. The following rounds restore the
@@ -209,13 +218,14 @@ class SettingsWriter:
         self._round_at_s = max(self._round_at_s, at_s)
 
     def _turned(self, rounds: int) -> list[Command]:
-        """Return the commands of a round. Each round begins with a different command.
+        """Return the commands of a round, in an order that differs from round to round.
 
-        Otherwise, a board that sends one report in each round could always miss the same line.
+        Each round begins with a different command. With a constant order, a board that sends one
+        report in each round could miss the same line each time.
 
-        The request for a date comes last, because the board answers at once and receives nothing
-        while it sends. The board would miss a setting that follows directly. A busy computer may
-        write all lines of a round together, without pauses.
+        The request for a date comes last. The board answers it at once, and receives nothing while
+        it sends, so it would miss a setting that follows directly. Pauses between the lines do not
+        prevent this: a busy computer may write all lines of a round together.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order
@@ -241,9 +251,9 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether the user has set a period of the date.
+        """Whether the user has set a period of the GPS date.
 
-        A request for one date would end the periodic sending of dates.
+        In this case, a request for one date is harmful: it ends the periodic sending of dates.
         """
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 

@@ -28,14 +28,14 @@ MOST_PERCENT: Final = 100
 # After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""After a Stop, RPM 0/0 is sent this number of times: directly before each of the next
+"""Number of times that RPM 0/0 is sent after a Stop. It is sent directly before each of the next
 set-points, or alone while no set-point follows. Once would be enough, but lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
     """Return the pair, rounded and limited to ±``most``, and whether a value was beyond this limit.
 
-    The ratio of both values is kept.
+    Both values are reduced by the same factor, so their ratio is kept.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0

@@ -15,8 +15,8 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
 """``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the last speed that the board measures before a
-wheel stops. A lower speed belongs to a wheel that starts. After a higher speed, at least one more
-tick follows, if the speed was measured correctly."""
+wheel stops. A speed below this range belongs to a wheel that starts. A speed above it is not the
+last one, if it was measured correctly: at least one more tick follows."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -24,15 +24,14 @@ WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 LOST_REPORTS: Final = 4
 LOST_S: Final = 0.25
-"""If the mean time between the last ``LOST_REPORTS`` reports is more than ``LOST_S``, reports were
-lost, or the board rarely sends reports. Late reads hardly change the mean of four reports."""
+"""Limit in s for the mean time between the last ``LOST_REPORTS`` reports. Above this limit, reports
+were lost, or the board rarely sends reports. Late reads hardly change the mean of four reports."""
 REPORT_S: Final = 0.2
-"""Usual longest time in s between two reports. While reports are lost, the clock of this module
-advances by at most this time with each report, so that the speeds before a gap are still known
-after it."""
+"""Usual longest time in s between two reports. This module has a clock of its own. While reports
+are lost, each report advances this clock by at most ``REPORT_S``, so that the speeds before a gap
+are still known after the gap."""
 HIDDEN_PART: Final = 0.3
-"""While the board reports no speeds, the clock of this module runs at this fraction of real
-time."""
+"""Speed of this module's clock while the board reports no speeds, as a fraction of real time."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -41,8 +40,9 @@ FASTER: Final[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 1.0)
 FELL_IN_GAPS: Final[tuple[float, ...]] = (0.0, 0.6, 0.8, 0.9, 1.0)
 GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1.0)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that a wheel is at rest. Index: how often the reported speed has been repeated. The
-values were counted on the public firmware:
+"""Probabilities that a wheel is at rest. The index is the number of times that the reported speed
+has been repeated. The values were counted on the public firmware. They depend on how the reported
+speed last changed:
 
 ``FAST``: after a fall to a speed above ``FAST_RPM``.
 
@@ -82,8 +82,8 @@ class RestingWheel:
         self._lone = False
         self._repeats = 0
         self._gaps = False
-        """Whether reports were being lost when the reported speed last changed. It stays False if
-        the user set the gains."""
+        """Whether reports were being lost when the reported speed last changed. Always False while
+        the user's gains are set."""
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0
         self.chance = 0.0
@@ -94,7 +94,10 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Remember an estimated speed. For ``since_s`` s, the board has reported no speed."""
+        """Remember an estimated speed, because the board reports none.
+
+        ``since_s``: time in s, until now, in which the board has reported no speed.
+        """
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
@@ -127,9 +130,9 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the probabilities that the wheel is at rest, by repetitions of the last speed.
+        """Return the probabilities that the wheel is at rest; empty if the wheel surely rolls.
 
-        Empty if the wheel surely rolls.
+        The index is the number of times that the last reported speed has been repeated.
         """
         if rpm >= FASTEST_RPM:
             return FASTER if self._fell_rpm >= FELL_FAR_RPM else ()

@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop until RPM 0/0 is sent. In this time, the tick counts can show the
-standstill. After RPM 0/0, the board does not count ticks any more."""
+"""Time in s from a Stop until RPM 0/0 is sent. During this time, the board still counts ticks, and
+the tick counts can show the standstill. After RPM 0/0, it does not count ticks any more."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
@@ -27,9 +27,9 @@ class SetPoints:
 
     ``saturated``: number of commands that were slowed, because a value was above its limit.
 
-    ``stopped_at_s``: time of the first zero set-point after the last motion command, infinity if
-    none was sent. Each time RPM 0/0 is due, ``clears`` replaces this time by a later time. The next
-    RPM 0/0 is due ``CLEAR_AFTER_S`` after the later time.
+    ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
+    none was sent. RPM 0/0 is due ``CLEAR_AFTER_S`` after this time. To plan a repetition of RPM
+    0/0, ``clears`` replaces this time by a later one.
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 
@@ -90,7 +90,7 @@ class SetPoints:
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now. If it is due, also plan its repetition."""
+        """Return whether to send RPM 0/0 now. If so, also plan when RPM 0/0 is repeated."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
@@ -138,7 +138,11 @@ class SetPoints:
 
     @property
     def kinematics(self) -> DifferentialKinematics:
-        """Kinematics of the robot. Left and right are those of the robot, not of the board."""
+        """Kinematics of the robot.
+
+        Left and right mean the robot's sides. If the board is inverted, its sides are the other way
+        round.
+        """
         settings = self.settings
         return DifferentialKinematics(
             wheel_radius_m=settings.wheel_radius_m, track_m=settings.track_m

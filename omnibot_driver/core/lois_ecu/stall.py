@@ -22,24 +22,25 @@ STALLED_S: Final = 2.0
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 LEAST_TICKS: Final = 2
-"""A wheel is watched only if its set-point gives at least this number of ticks in ``STALLED_S``.
-With fewer ticks, a wheel that rolls may show no motion."""
+"""Smallest number of ticks in ``STALLED_S`` that a set-point must give, so that its wheel is
+watched. With fewer ticks, a wheel that rolls may show no motion."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""Limits of a reported speed: ``TOO_FAST`` times the set-point, and ``TOO_FAST_RPM`` above the
-set-point, in RPM. If the board repeats a speed above both limits, the wheel is at rest and the
-speed is old."""
+"""Two limits of a reported speed. The first is the set-point times ``TOO_FAST``, the second is
+``TOO_FAST_RPM`` RPM above the set-point. If the board repeats a speed above both limits, the speed
+is an old one, and the wheel is at rest."""
 UNLIKE: Final = 1.15
-"""If both wheels roll backward, both may be too fast, but by about the same factor (speed divided
-by set-point). The two factors are assumed to differ at most by ``UNLIKE``."""
+"""Largest assumed ratio between the factors of the two wheels. The factor of a wheel is its speed
+divided by its set-point. Backward, both wheels may roll too fast, but with similar factors."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
 """Smallest number of reports without motion after which a wheel is regarded as stalled:
 ``AT_LEAST`` for a wheel commanded forward, ``AT_LEAST_BACKWARD`` for a wheel commanded backward.
-The numbers prevent a false alarm on a bad line, where few reports arrive. Backward, more reports
-are needed: a wheel that rolls steadily may also show the same speed in a few reports."""
+The numbers prevent a false alarm on a bad line, where few reports arrive. A wheel commanded
+backward needs more reports: an unchanged speed may show its stall, but a wheel that rolls steadily
+may show the same speed in a few reports, too."""
 
 
 class StallWatch:
@@ -58,8 +59,8 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.may_roll = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of reports without motion, since the wheel last turned or was
-        started. Only reports that could have shown its motion are counted."""
+        """For each wheel: number of reports without motion since the wheel last turned, or since it
+        was commanded to turn. Only reports that could have shown the wheel's motion are counted."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
@@ -84,7 +85,7 @@ class StallWatch:
         now: float,
         resting: tuple[bool, bool] = (False, False),
     ) -> None:
-        """Process a report: ticks show forward motion, and odometry backward motion.
+        """Process a report. Ticks show forward motion; the board's odometry shows backward motion.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """
@@ -110,8 +111,9 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return which commanded wheels have not turned for ``STALLED_S``.
 
-        At least ``AT_LEAST`` reports (backward: ``AT_LEAST_BACKWARD``) must show this.
-        If a wheel is reported, the timing of both wheels begins again.
+        The standstill must be shown by at least ``AT_LEAST`` reports (backward:
+        ``AT_LEAST_BACKWARD``). After a stall is returned for one wheel, the time of both wheels is
+        counted from zero again.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Model of one wheel's commands: when they take effect, and what the firmware then counts.
+"""Model of one wheel's commands: when they take effect, and whether the firmware counts ticks then.
 
 The public firmware counts ticks only while the RPM target is positive.
 
@@ -89,7 +89,7 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """Return the time in s at which the next effect is due, or infinity."""
+        """Return the time in s of the next effect of a command; infinity if no effect is due."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:

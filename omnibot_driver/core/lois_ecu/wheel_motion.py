@@ -16,15 +16,18 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
 tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""Indices of the body's states. ``X``, ``Y``: position in m.
+"""Indices of the body's states.
 
-``TURN``, ``ALONG``: motion in m that the board's odometry (0x20) should show. ``TURN``: how much
-farther the right wheel has rolled than the left one. ``ALONG``: mean distance of both wheels.
+``X``, ``Y``: position in m.
 
-``BIAS``: first of two states, the error of each wheel's speed.
+``TURN``: how much farther the right wheel has rolled than the left one, in m. ``ALONG``: mean
+distance of both wheels, in m. Both are what the board's odometry (0x20) should show.
 
-``EXCESS``: first of two states, the excess of each wheel. A wheel that rolls backward is faster
-than its set-point by the excess, which is a fraction of the set-point.
+``BIAS``: index of the first of two states, one for each wheel. The state is the error of the
+wheel's speed.
+
+``EXCESS``: index of the first of two states, one for each wheel. A wheel that rolls backward is
+faster than its set-point. The state is this excess, as a fraction of the set-point.
 """
 STATES: Final = 18
 
@@ -38,8 +41,8 @@ SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that uneven ground adds to a wheel's speed, in (m/s)² per s."""
 WINDUP_M: Final = 0.08
-"""Integral of target minus measured speed, in m, in the speed controller. At this value, a wheel at
-rest starts to move."""
+"""Value, in m, of the speed controller's integral at which a wheel at rest starts to move. The
+integral is that of target minus measured speed."""
 DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
@@ -51,8 +54,9 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""If a wheel halts soon after a new set-point, its speed is assumed to have been wrong for this
-time in s. First value: with the board's own gains. Second value: with the user's gains."""
+"""Time in s for which a wheel's modelled speed is assumed to have been wrong, if the wheel halts
+soon after a new set-point. First value: with the board's own gains. Second value: with the user's
+gains."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -94,9 +98,9 @@ class Wheel:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m that the wheel had rolled when it last certainly turned, or when a command
-        to turn took effect. If the wheel is later found to be at rest since that time, the distance
-        added since then is subtracted."""
+        """Distance in m that the wheel had rolled at the last time at which its motion was certain,
+        or at which a command to turn took effect. If the wheel is later found to have been at rest
+        since that time, the distance that was added since then is subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:
@@ -113,8 +117,8 @@ class Wheel:
         """Whether the wheel has no power after a reset of the controller, because the integral
         ``wound_m`` is still too small."""
         self.rolls_on = False
-        """Whether the reported speed may be from before the last reset of the controller, so that
-        it is not used."""
+        """Whether the speed that the board reports is not used, because it may still be from before
+        the last reset of the controller."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf

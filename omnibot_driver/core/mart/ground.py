@@ -51,16 +51,17 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 The silence is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
-"""The driver expects answers to at most this number of its last HELLO queries."""
+"""Largest number of HELLO queries whose answers the driver still expects. If more queries are
+unanswered, it expects answers to the last ones only."""
 HEADING_S, HEADING_TRIPS = 1.0, 5
 NO_HEADING: Final = (
     "the server does not report the relative heading (RMRA) of the robot at rest, so the heading of"
     " the odometry is uncertain: check the network and the server"
 )
 PRESENT_S: Final = 0.35
-"""A server whose silence was at most this long has certainly not been restarted.
+"""Longest silence of a server after which it has certainly not been restarted.
 
-The limit is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
+The silence is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
@@ -180,9 +181,9 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that is in progress or may run again; otherwise None.
+        """Start time of a controlled move that is in progress, or that may run a second time.
 
-        During a controlled move, the server reports no measurements.
+        None if there is no such move. During a controlled move, the server reports no measurements.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
@@ -274,9 +275,10 @@ class Ground:
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        This is so after a forward drive (RM). The odometry needs a heading that was measured at
-        rest before the count that ends the motion. The driver waits for at most HEADING_S, plus
-        HEADING_TRIPS times the duration of a query. Then it logs NO_HEADING once.
+        It must wait after a forward drive (RM). For the odometry, the first encoder count at rest
+        ends the drive. Before this count, the odometry needs a heading that was measured at rest.
+        The driver waits for at most HEADING_S, plus HEADING_TRIPS times the duration of a query.
+        Then it logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

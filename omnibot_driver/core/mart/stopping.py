@@ -44,17 +44,19 @@ SLOW_STOP: Final = (
 NO_START_S: Final = 0.75
 """Duration in s of a controlled turn (MCR, MCL) beyond which a wheel has certainly turned.
 
-The server waits 0.6 s for a wheel to turn. After the turn, it waits 0.75 s for the robot to stop.
+If no wheel turns, the server gives up after 0.6 s. If a wheel turns, the turn lasts longer than
+0.75 s, because the server then waits 0.75 s for the robot to stop.
 """
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels turned too long after its end.
 
-    The motors are then off. For a controlled turn, the server may send the failure text of a turn
-    that has not begun, so the duration decides.
+    In this case, the motors are off. For a controlled turn, the server may report this failure with
+    the text for a turn that has not begun. A turn of more than ``NO_START_S`` has certainly begun,
+    so then this text means that the wheels turned too long.
 
-    ``lasted_s``: time from the start to the reply, without the transit times.
+    ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """
     if not isinstance(reply, Fail):
         return False
@@ -67,11 +69,13 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of earlier requests whose missing replies would look like a reply to the stop.
+    ``owed``: number of earlier requests that are not answered yet, and whose replies would look
+    like a reply to the stop.
 
-    ``move``: the controlled move to stop, or None. Its own reply ends the stop.
+    ``move``: the controlled move to stop, or None. The reply to the move itself ends the stop.
 
-    ``planned``: whether the motion had no fault: only another motion or a standstill is wanted.
+    ``planned``: whether the motion is stopped without a fault, only because another motion or a
+    standstill is wanted.
     """
 
     def __init__(
@@ -167,7 +171,7 @@ class Stopping:
     def doubt(self, reply: Ok, *, likely: bool = True) -> None:
         """Record a reply that may belong to the stop, but may also be late or a copy.
 
-        ``likely``: whether the number in it is plausible for the reply to the stop.
+        ``likely``: whether the number in the reply is plausible for a reply to the stop.
         """
         if reply.form in ANSWERS.get(self.motion, ()):
             self._doubtful.append((reply, likely))
@@ -176,9 +180,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop, or None.
 
-        If there are at most ``owed`` doubtful replies, the result is None: all of them may be
-        missing replies to earlier requests. If there are more, the result is the last doubtful
-        reply with a plausible value, or the last one if no value is plausible.
+        It is None if there are at most ``owed`` doubtful replies, because all of them may be late
+        replies to earlier requests. If there are more, it is the last doubtful reply with a
+        plausible value. If no value is plausible, it is the last doubtful reply.
         """
         if len(self._doubtful) <= self._owed:
             return None

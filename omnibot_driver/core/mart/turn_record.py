@@ -13,7 +13,8 @@ from typing import Final
 from omnibot_driver.core.mart.words import Request
 
 SAME_DEG: Final = 0.5
-"""Largest accepted difference between the requested angle in degrees and the one in the file."""
+"""Largest accepted difference, in degrees, between the angle of the turn's command and the
+requested angle that the file of the turn contains."""
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
 """Limits of the sum of all angles that were read from records, in rad.
 
@@ -23,7 +24,7 @@ ENOUGH_RAD on, it downloads no more records.
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
 UNRECORDED: Final = 3
-"""After this number of downloads in a row without a usable record, the driver downloads no more."""
+"""Number of downloads in a row without a usable record after which the driver downloads no more."""
 _HEAD: Final = re.compile(
     rb"MC Spin sensor data log\r?\n"
     rb".*\nTarget motion \([^)]*\): (?P<asked>\d+\.\d+)\r?\n"
@@ -56,7 +57,7 @@ class TurnRecords:
 
     @property
     def balance(self) -> float | None:
-        """The speed of the left motor divided by that of the right one in controlled turns.
+        """The speed of the left motor divided by the speed of the right motor, in controlled turns.
 
         None until the records have shown this ratio.
         """
@@ -71,11 +72,11 @@ class TurnRecords:
         self._failures += 1
 
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
-        """Return the angle of a turn in degrees, with the server's sign, from its file.
+        """Return the angle of a turn in degrees, with the server's sign, from the file of the turn.
 
         ``name``, ``pieces``: name and content of the file. ``request``: the turn's command.
 
-        Return None if the file records another turn or has no angle. Return None also if the
+        Return None if the file records another turn, or has no angle. Return None, too, if the
         previous file had the same name: the server could not write a new file, and has sent the old
         one again.
         """
@@ -83,10 +84,10 @@ class TurnRecords:
         return None if again else recorded_deg(pieces, request)
 
     def used(self, told_rad: float, wheel_rad: float) -> None:
-        """Learn from a record that the odometry has used.
+        """Receive a recorded turn that the odometry has used, to compute the ratio of the motors.
 
-        ``told_rad``: the recorded turn. ``wheel_rad``: the part of the turn that the right wheel
-        has caused. With equal motors, this is half of the turn.
+        ``told_rad``: the turn according to the record. ``wheel_rad``: the part of the turn that the
+        right wheel has caused. With equal motors, this is half of the turn.
         """
         self._failures = 0
         self._told_rad += abs(told_rad)

@@ -22,7 +22,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s for which a robot still counts as driven after it was commanded to stand still."""
+"""Time in s after a command to stand still in which the robot still counts as driven."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -38,7 +38,8 @@ STOOD_S: Final = 0.5
 If the robot moves later, the cause is not a lost Stop but, for example, a push.
 """
 STOPS_S: Final = 5.0
-"""Time in s for which the command policy repeats Stop, by default, if the robot keeps moving."""
+"""Time in s for which the command policy sends Stop again and again to a robot that keeps moving.
+The value is the default of the policy."""
 
 REFUSED_IN_A_ROW: Final = 4
 COSINE_60: Final = 0.5
@@ -89,7 +90,8 @@ ADVICE: Final[Mapping[Fault, str]] = {
 class MotionMonitor:
     """Compares the motion of one robot with its commands.
 
-    * ``commanded``, ``measured``: twists when the robot last moved too fast or the wrong way.
+    * ``commanded``, ``measured``: the two twists at the last time when the robot moved too fast or
+      the wrong way.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -152,8 +154,9 @@ class MotionMonitor:
     def count_impossible(self, now: float) -> Fault | None:
         """Return the fault that four impossible displacements in a row show, or None.
 
-        Call this instead of ``check`` for an impossible displacement that the outlier filter has
-        passed on. A single one is a correction of the board's own odometry.
+        The outlier filter passes some impossible displacements on, because the board may have
+        corrected its own odometry. Call this method for such a displacement, instead of ``check``.
+        A single one is regarded as a correction.
         """
         self._error.reset()
         self._impossible += 1
@@ -175,7 +178,7 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: mean twist during the ``seconds`` before ``stamp_s``.
+        ``motion``: mean twist of the displacement, which took ``seconds`` and ended at ``stamp_s``.
 
         ``heading_known``: if False, the direction of the linear velocity is not checked.
         """
@@ -237,7 +240,7 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
+        """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
         While a robot is being pushed, Stop is sent at ever longer intervals.
 
@@ -259,7 +262,7 @@ class MotionMonitor:
         return Fault.UNCOMMANDED
 
     def _blocked(self, motion: BodyTwist, seconds: float, *, heading_known: bool) -> Fault | None:
-        """Return the fault of a robot that has not moved for 1 s despite a command, else None."""
+        """Return the fault of a robot that has not moved for 1 s despite a command, or None."""
         current = self._history.current
         assert current is not None
         wanted, turning = speed_of(current), current.yaw_rate_radps

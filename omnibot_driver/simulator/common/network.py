@@ -30,7 +30,9 @@ _GOOD = NetworkFaults()
 
 
 class NetworkPath:
-    """One direction of a network; the same datagrams, times and seed give the same faults.
+    """One direction of a network.
+
+    The faults depend only on the datagrams, their times and the seed.
 
     lost, duplicated: numbers of datagrams lost and duplicated so far.
     """
@@ -78,7 +80,7 @@ class FaultyNetwork:
 
     @property
     def counts(self) -> Counter[str]:
-        """Numbers of ``lost`` and ``duplicated`` datagrams in both directions, by these names."""
+        """Numbers of datagrams, in both directions, with the keys ``lost`` and ``duplicated``."""
         paths = (self.to_board, self.from_board)
         return Counter(
             lost=sum(path.lost for path in paths), duplicated=sum(path.duplicated for path in paths)

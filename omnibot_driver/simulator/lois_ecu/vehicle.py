@@ -42,8 +42,8 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: the board's factors for each encoder's short and long level. The true lengths
-    of the levels fit these factors exactly.
+    ``corrections``: for each encoder, the board's two factors that correct short and long levels.
+    The simulated levels have exactly the lengths for which these factors are right.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Vehicle:
         return all(motor.rpm == 0.0 for motor in self.motors)
 
     def advance(self, duties: tuple[float, float], now_s: float, step_s: float) -> list[Edge]:
-        """Advance by the step that ends at ``now_s``. Return the encoder edges in order of time."""
+        """Simulate the step that ends at ``now_s``. Return the encoder edges in order of time."""
         slip = self._settings.slip
         ways: list[float] = []
         edges: list[Edge] = []

@@ -27,7 +27,7 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FileNote:
-    """The data from which the file of a motion is made.
+    """The data from which the server's file about a motion is made.
 
     head: first lines of the file.
     rows: number of samples in the file.
@@ -53,7 +53,7 @@ class FileNote:
 
 
 def note_of(server: "ServerState", motion: Motion) -> FileNote:
-    """Return the data from which the file of a motion is made. The motion must have ended."""
+    """Return the data for the server's file about a motion. The motion must have ended."""
     record = _turn_record(motion) if motion.kind is Kind.CONTROLLED_SPIN else ()
     head = (
         *record[:1],

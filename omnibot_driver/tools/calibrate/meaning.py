@@ -23,12 +23,13 @@ STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
 """Largest ratio of late to early speed at which the robot is regarded as stopping.
 
-Early and late: the two halves of a drive.
+The early and the late speed are those of the first and the second half of a drive.
 """
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Limits of the speed ratio when the command doubles. They allow for friction and rounding.
+"""Limits of the ratio of two speeds, the second of which is measured with twice the command.
 
-``DOUBLED``: range of a doubled speed. ``UNCHANGED``: largest ratio of an unchanged speed.
+``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: ratio up to which the
+speed is regarded as unchanged. The limits allow for friction and rounding.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
@@ -36,7 +37,8 @@ PURE_TURN: Final = 0.5
 The ratio is 0 for correctly interpreted deltas, otherwise 2 or more.
 """
 ALIKE: Final = 0.35
-"""Two angles are regarded as equal if they differ by at most this fraction of the robot's turn."""
+"""Largest difference of two angles that are regarded as equal, as a fraction of the robot's turn.
+"""
 
 
 LEAST_M: Final = 1e-3
@@ -44,9 +46,9 @@ LEAST_M: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Mean velocity of the robot over a time span, by the odometry, in the body's axes.
+    """Mean velocity of the robot over a time span, measured by the odometry, in the body's axes.
 
-    ``early_mps``, ``late_mps``: speeds in the two halves of the span.
+    ``early_mps``, ``late_mps``: speeds in the first and the second half of the span.
     """
 
     vx_mps: float

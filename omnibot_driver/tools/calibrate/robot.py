@@ -40,9 +40,9 @@ In this time the driver can repeat a lost request.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
-"""Time at rest, in s, after which the tool regards the robot as stopped."""
+"""Time in s for which the robot must be at rest before the tool regards it as stopped."""
 STANDING: Final = 0.01
-"""Speed in m/s, and yaw rate in rad/s, up to which the tool regards the robot as at rest."""
+"""Largest speed, in m/s, and largest yaw rate, in rad/s, of a robot at rest."""
 UNRULY: Final = (
     "Stop was sent, but the robot still moves, or no odometry arrives; cut its power, then see"
     " docs/safety.md"
@@ -142,7 +142,7 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Record the response to ``command``; return the path of the driver's record.
+        """Let the driver record the response to ``command``; return the path of the record's file.
 
         The robot must be at rest. Raises ToolError on an e-stop, lost data, or a failure that the
         driver reports. Commands of other nodes are not noticed.

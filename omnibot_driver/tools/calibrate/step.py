@@ -81,8 +81,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    The steps begin at different times within the period of the odometry deltas. Together, the
-    deltas then show the whole response.
+    Each step begins at another time within the period of the odometry deltas. So the deltas of all
+    steps together show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

@@ -25,9 +25,9 @@ UNLIKE: Final = 1.5
 A larger factor shows that the board missed an edge of the encoder's signal or noticed it late.
 """
 SMOOTHED: Final = 4
-"""Number of successive times between ticks from which one speed is computed.
+"""Number of successive times between ticks from which one speed is computed, by their sum.
 
-A displaced mark changes the sum of these times only if the sum begins or ends at this mark.
+A displaced mark changes this sum only if the sum begins or ends at the mark.
 """
 
 

@@ -30,9 +30,11 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: limits of the pose's change between two messages, in m and m/s. The
-pose may move by JUMP_M + JUMP_MPS · time. If it moves farther, the odometry was reset, and a new
-path begins."""
+"""``JUMP_M``, ``JUMP_MPS``: limits of the pose's change between two messages, in m and m/s.
+
+The pose may move by JUMP_M + JUMP_MPS · time. If it moves farther, the odometry was reset, and the
+model begins a new path.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,7 @@ class View:
 
     An outdated value is None or empty too, except ``state``, ``estop``, ``pose`` and ``path``.
 
-    ``estop_asked``: the e-stop is requested, but the driver has not confirmed it.
+    ``estop_asked``: whether the e-stop is requested, but not yet confirmed by the driver.
 
     ``silent_s``: time since the driver's last message.
 
@@ -63,7 +65,7 @@ class View:
 
     ``said``: the reply to the user's last action.
 
-    ``lacks``: those of ``imu``, ``start`` and ``pause`` that the board lacks.
+    ``lacks``: what the board does not have. Possible members: ``imu``, ``start``, ``pause``.
     """
 
     driver: str
@@ -176,7 +178,7 @@ class Model:
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
         """Store a message of ``cmd_vel``.
 
-        Another node has sent it, so the message does not show that the driver runs.
+        Another node has sent this message, so its arrival does not show that the driver runs.
         """
         self._commanded = twist, now_s
 

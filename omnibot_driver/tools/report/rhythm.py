@@ -22,15 +22,14 @@ LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Standard deviation of the steps between timestamps, in periods, above which the steps are
-regarded as uneven."""
+"""Largest standard deviation, in periods, of steps between timestamps that are regarded as even."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Longest time in s within which short steps between timestamps can compensate a long step.
+"""Longest time in s in which short steps between timestamps can compensate a long step.
 
-If they do not compensate it within this time, messages are regarded as missing.
+If the short steps come later, messages are regarded as missing.
 """
 
 
@@ -153,7 +152,7 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
     """Return the gap from the last message to the end of the log.
 
-    None: the gap is short, or the driver's state explains it.
+    Return None if the gap is short, or if the driver's state explains it.
     """
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
@@ -162,10 +161,12 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step, the end of the range in which short steps can compensate it.
+    """Return, for each long step, the index at which its range ends.
 
-    The end is the index of the first step after the range. The range begins at the long step. It
-    has ``most`` steps, or fewer if another long step comes earlier.
+    Within the range, short steps can compensate the long step. The range begins at the long step.
+    It has ``most`` steps, or fewer if another long step comes earlier. The returned index is that
+    of the first step after the range.
+
     ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
@@ -311,7 +312,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    A restarted driver counts from zero again. So if a count decreases, its new value is added.
+    A restarted driver counts from zero again. So if a count has decreased, its whole new value is
+    regarded as growth.
     """
     if not log.alone:
         return None

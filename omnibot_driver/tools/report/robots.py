@@ -38,9 +38,9 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """Return the possible roles of this topic, according to its name.
 
-    The value of each role is a pair: the robot's namespace, and whether the role really fits. A
-    role fits only if ``kind`` is a message type of the role. A role such as ``state`` fits only if
-    the topic also belongs to a node in ``drivers``.
+    The value of each role is a pair: the robot's namespace, and whether type and node fit the role.
+    The type fits if ``kind`` is a message type of the role. The node matters only for a role such
+    as ``state``: the topic must belong to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

@@ -73,9 +73,9 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
 
 @pytest.mark.slow
 def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
-    """The user sets an impossible radius, and the board does not keep it.
+    """The user sets an impossible radius, which the board does not keep.
 
-    A notice names the setting.
+    A notice names the setting that the board does not keep.
     """
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
     bench.run(4.0)
@@ -125,7 +125,7 @@ def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
 
 
 def test_what_was_read_once_is_asked_for_again() -> None:
-    """The driver queries a value a second time to confirm it, and then not again."""
+    """The driver queries a value exactly twice: the second report confirms the first one."""
     bench = nominal()
     bench.run(2.0)
     assert bench.lines(DRIVE).count("confi") == 2
@@ -133,9 +133,9 @@ def test_what_was_read_once_is_asked_for_again() -> None:
 
 
 def test_what_was_written_and_read_once_is_not_written_again() -> None:
-    """The driver has read back a written value once.
+    """The driver has written a value, and has read it back once.
 
-    It queries the value again, but does not write it.
+    It queries the value a second time, but it does not write it a second time.
     """
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     bench.run(2.0)
@@ -197,7 +197,7 @@ def test_a_number_counts_as_written_if_only_the_boards_rounding_hides_it(
 ) -> None:
     """The board prints a value with more or fewer decimals than the user has set.
 
-    If only rounding explains the difference, the value counts as written.
+    The value counts as written if rounding alone explains the difference. Otherwise, it does not.
     """
     configuration = Configuration("drive", {Written.WHEELS: (0.07724, 0.07776, 19.0, 68.0, 0.4)})
     configuration.due(0.0, stands=True)
@@ -210,7 +210,7 @@ def test_a_number_counts_as_written_if_only_the_boards_rounding_hides_it(
 def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() -> None:
     """The user changes a setting while the robot is driven.
 
-    The driver writes it when the robot rests.
+    The driver writes the setting to the board when the robot rests.
     """
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.4, 0.42)}))
     bench.drive_on()
@@ -280,7 +280,8 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """The line that writes a setting is lost. Motion is refused until the board has the setting.
 
-    The reason: while the robot is driven, the driver would not repeat this line.
+    Otherwise, the board could drive without the setting: while the robot is driven, the driver does
+    not repeat the line.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

@@ -72,9 +72,10 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 
 
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
-    """The driver reads once in 0.05 to 0.35 s. Ticks and odometry then come in the same read.
+    """The driver reads once in 0.05 to 0.35 s, so ticks and odometry come in the same read.
 
-    The driver detects each wheel that stops. Otherwise, the position would be wrong by 4 m.
+    Nevertheless, the driver detects each wheel that stops. Otherwise, the position would be wrong
+    by 4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -98,7 +99,7 @@ def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_compute
 ) -> None:
     """The driver reads once in 0.05 to 0.35 s, so it detects late what the wheels do.
 
-    The heading is then wrong by up to 30°. The covariance includes this.
+    The heading is then wrong by up to 30°. The covariance includes this error.
     """
     one = motion(wrong("firmware", seed), "place left", HOST_GAINS, reads_s=LATE_READS_S)
     assert one.sigmas < 4.0

@@ -36,7 +36,7 @@ RPM = math.tau / 60
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     """After the port is opened, the driver writes low pass, periods and gains to the board.
 
-    The robot can then be driven.
+    After that, the robot can be driven.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
@@ -176,10 +176,11 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 @pytest.mark.slow
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """The robot drives at 30 RPM and is stopped. In this test, no RPM 0/0 follows the Stop.
+    """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    RPM 0/0 would clear the last measured speed, which the firmware now keeps. So a set-point of 8
-    RPM, without feed-forward, does not start the wheels.
+    The robot drives at 30 RPM and is stopped. The firmware keeps the last measured speed, which RPM
+    0/0 would clear. In this test, RPM 0/0 is not sent. So a set-point of 8 RPM, without
+    feed-forward, does not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -214,9 +215,9 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
     [*(("firmware", kind) for kind in RecordKind), ("documented", RecordKind.TORQUE)],
 )
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The user requests a record while the wheels turn. The record arrives complete.
+    """The user requests a record, for example of the times between ticks, while the wheels turn.
 
-    The unit of the times in the record depends on the kind of firmware.
+    The record arrives complete. The unit of its times depends on the kind of firmware.
     """
     rig = Rig(nominal(firmware))
     rig.run(4.0)
@@ -258,7 +259,10 @@ def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type)
 
 
 def test_a_record_that_lost_a_line_is_given_up() -> None:
-    """A line of a record is lost. The driver reports the failure and discards all samples."""
+    """A line of a record is lost, so a part of the samples is missing.
+
+    The driver reports the failure and discards all samples.
+    """
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     rig.driver.record(RecordKind.TORQUE, 100)
@@ -284,9 +288,9 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """Foreign data arrives, and a notice names its likely sender.
+    """Data that is not from a LOIS ECU arrives. A notice names the likely sender of the data.
 
-    The first valid line ends the notice.
+    The notice ends at the first valid line.
     """
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []

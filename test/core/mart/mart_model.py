@@ -41,12 +41,12 @@ class Driver(NamedTuple):
 
     ``moved``: whether the last motion was a controlled move (``MOVES``).
 
-    ``counted``: whether the encoder was read after the last stop, at a time when no late command
-    could do harm.
+    ``counted``: whether the encoder was read after the last stop, when no late command could do
+    harm any more.
 
     ``greeted``: whether a stop of the driver was confirmed at least once.
 
-    ``underway``: whether the motors may be under direct control (MCS), as far as the driver knows.
+    ``underway``: whether, as far as the driver knows, the motors may be under direct control (MCS).
     """
 
     state: State = State.UNKNOWN
@@ -75,16 +75,18 @@ class World(NamedTuple):
 
 
 Rules = Callable[[State, str, Motion], bool]
-"""The table of commands, as a function: whether a command is allowed in a state and motion."""
+"""A function that tells whether a command is allowed in a state and motion. It has the content of
+the driver's table of commands."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
-"""The same table, as a function that returns all commands allowed in a state and motion."""
+"""A function that returns all commands that the table of commands allows in a state and motion."""
 Step = tuple[str, World]
 
 
 def ready(world: World, word: str) -> bool:
-    """Return whether the modelled driver is ready to send ``word``, which its table allows.
+    """Return whether the modelled driver is ready to send ``word``.
 
-    The driver must have waited for late copies and checked the IMU, as the real driver does.
+    The table of commands must allow ``word``. Before some commands, the driver must also have
+    waited for late copies and checked the IMU. The real driver does the same.
     """
     driver = world.driver
     row = BY_TEXT[word]
@@ -152,7 +154,8 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    If a copy of a move has arrived during this move, the server may execute the copy afterwards.
+    During the move, a late copy of a move may have arrived at the server. The server may execute
+    this copy after the move.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -201,9 +204,9 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether the driver used the stop port and none of its stops was ever confirmed.
+    """Return whether the driver must find out which motion is in progress before it does more.
 
-    In that case, it must first find out which motion is in progress.
+    This is so if it has used the stop port, and none of its stops was ever confirmed.
     """
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
@@ -212,7 +215,8 @@ def sweeps_first(driver: Driver) -> bool:
 def _asked(world: World) -> Step:
     """Return the step in which the driver finds out which motion is in progress.
 
-    The driver does this after a stop on the stop port. A lost reply changes nothing.
+    The driver does this after a stop on the stop port. There is no step for a lost reply, because a
+    lost reply changes nothing.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -281,8 +285,9 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply is late. The driver does not accept a late reply to a check, a
-    controlled move or MSM. A check and a move take longer than a reply can be late.
+    ``late``: whether the reply is late, so that it may belong to an earlier command. The driver
+    does not accept a late reply to a check, a controlled move or MSM. A check and a move last
+    longer than the longest delay of a reply, so a late reply arrives too early to be theirs.
     """
     driver = world.driver
     state = driver.state

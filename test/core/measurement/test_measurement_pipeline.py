@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements through a complete session: SI units, stamps and a continuous pose."""
+"""Tests of measurements from a complete session: SI units, stamps and a continuous pose."""
 
 import itertools
 import math
@@ -33,10 +33,10 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 
 
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
-    """Each odometry estimate has the stamp of the IMU sample of its tick.
+    """Each odometry estimate has the stamp of the IMU sample of the same tick.
 
-    This is also true for displacements that are published later, because they wait for the board's
-    first pose.
+    The first displacements wait for the board's first pose, and are published later. Their stamps
+    are right, too.
     """
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
@@ -86,10 +86,10 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_closed(
     bench: Bench,
 ) -> None:
-    """The connection is lost and the robot is pushed. Later data will show this motion.
+    """While the connection is lost, a reset of the odometry is refused.
 
-    So odom would not stay at zero after a reset. The reset is refused until data arrives again.
-    Then it succeeds.
+    The robot is pushed in this time, and later data will show this motion. So after a reset, odom
+    would not stay at zero. When data arrives again, the reset succeeds.
     """
     bench.speaks = False
     bench.run(2.0)

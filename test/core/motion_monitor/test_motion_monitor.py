@@ -133,7 +133,7 @@ def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: 
 
 @given(motions=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=2, max_size=2))
 def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -> None:
-    """Two displacements in a row are damaged and have any size. The monitor finds no fault."""
+    """Two displacements in a row are damaged. Whatever their size, the monitor finds no fault."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -205,8 +205,8 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
     """A commanded robot does not move. The monitor returns a fault each second.
 
-    The caller must filter the repetitions. After a release of the e-stop, the fault is that the
-    board may still hold the e-stop.
+    The caller must filter the repetitions. After a release of the e-stop, the monitor returns
+    another fault: the board may still hold the e-stop.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -255,9 +255,9 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot does not receive Stop and drives on. It may receive a later Stop.
+    """A driven robot drives on, because it has not received Stop. A later Stop may reach it.
 
-    The monitor therefore reports a fault every 5 s. Each fault makes the driver send Stop.
+    Therefore, the monitor reports a fault every 5 s. Each fault makes the driver send Stop.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -282,9 +282,9 @@ def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
 
 
 def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -> None:
-    """Four displacements in a row are rejected as impossible. This is a fault.
+    """The outlier filter rejects four displacements in a row as impossible. This is a fault.
 
-    If a plausible displacement comes between them, there is no fault.
+    If a plausible displacement comes between the rejected ones, there is no fault.
     """
     drive = Drive()
     assert [drive.monitor.count_refused(count, drive.now) for count in range(4)] == [None] * 4

@@ -11,14 +11,14 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
-    """Return a displacement straight ahead, before which ``lost`` displacements are missing."""
+    """Return a displacement straight ahead. ``lost``: number of displacements missing before it."""
     return DisplacementReading(dx_m, 0.0, 0.0, "body", duration_s, lost)
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements are missing between one with 0.5 m/s and one with 1 m/s.
+    """Four displacements are missing. The one before them has 0.5 m/s, the one after them 1 m/s.
 
-    Each missing one is estimated as the mean, 0.75 m/s.
+    For each missing displacement, the estimate is the mean, 0.75 m/s.
     """
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
@@ -59,9 +59,9 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 
 def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
-    """A displacement has an unknown duration, as after a pause, so its speed is unknown.
+    """A displacement has an unknown duration, for example after a pause. So its speed is unknown.
 
-    It is not used to estimate the motion in a gap.
+    Therefore, it is not used to estimate the motion in a gap.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the sum of all delays from sampling to reading. A text or a pause adds nothing."""
+"""Tests of the sum of all delays from sampling to reading. Texts and pauses add no delay to it."""
 
 import pytest
 from session_bench import TICK_S, Bench
@@ -11,7 +11,7 @@ from omnibot_driver.core.requests import Request
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
     """The board is paused at first, and sends only its «Paused» text, which has no sampling time.
 
-    The text adds no delay.
+    The text adds nothing to the sum of the delays. So the sum stays a finite number.
     """
     bench = Bench()
     bench.open()
@@ -24,7 +24,7 @@ def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
 
 
 def test_a_pause_is_not_a_delay() -> None:
-    """The board is paused for 20 s. This time does not count as delay."""
+    """The board is paused for 20 s. This time is not added to the sum of the delays."""
     bench = Bench()
     bench.open()
     bench.run_until_state("nominal")

@@ -89,7 +89,7 @@ class Clock:
     def wait(
         self, _read: object, _write: object, _error: object, timeout_s: float
     ) -> tuple[list[int], list[int], list[int]]:
-        """Advance by the timeout, as ``select`` does when nothing arrives."""
+        """Replace ``select``: advance the clock by the timeout, and report that nothing arrived."""
         self.now_s += timeout_s
         return [], [], []
 
@@ -182,9 +182,9 @@ def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
-    """A second simulator replaces the link of the first one.
+    """A second simulator replaces the link of the first simulator. Then the first simulator ends.
 
-    Then the first one ends. It does not remove the link, which leads to the second one's terminal.
+    It does not remove the link, because the link now leads to the terminal of the second simulator.
     """
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)):

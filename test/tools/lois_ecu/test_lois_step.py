@@ -290,8 +290,8 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
     """The times of a record have overflowed, so they are unknown. The tool refuses the record.
 
-    The times are in the manual's unit, 100 ns. A number of the record holds at most 6.6 ms in this
-    unit, but the usual times between ticks are longer.
+    The times are in the manual's unit, 100 ns, in which a number of the record can be at most 6.6
+    ms. The usual times between ticks are longer.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
