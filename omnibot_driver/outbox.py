@@ -71,8 +71,7 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Let the thread that runs ``serve`` make the queued calls, so the caller is not delayed.
-        """
+        """Let the thread in ``serve`` make the queued calls. The caller is not delayed."""
         if self._waiting:
             self._handed_over.set()
 

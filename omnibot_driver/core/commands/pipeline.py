@@ -251,8 +251,8 @@ class CommandPipeline:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
         Only the loss of a goal gives a notice, because the user sends a goal only once. A velocity
-        command needs no notice: it is sent repeatedly, and the user is told when the next one is
-        refused.
+        command needs no notice: it is sent repeatedly, and the driver reports the refusal of the
+        next one.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
