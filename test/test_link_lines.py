@@ -215,9 +215,10 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
 
 
 def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> None:
-    """The board's state decides which bytes stop it. The link sends these to the guard process.
+    """The bytes that stop the board depend on the board's state.
 
-    When the state changes, the link sends the new bytes.
+    The link sends the bytes for the present state to the guard process. When the state changes, the
+    link sends the new bytes.
     """
     with closing(Lines(tmp_path, MoodyBoard())) as lines:
         lines.connect()

@@ -65,7 +65,8 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
     """A board is unplugged during a drive and comes back under another device name.
 
-    udev's symbolic link points to this name. The old command is not repeated.
+    The link finds it, because udev's symbolic link points to the new name. The link does not repeat
+    the old command.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()

@@ -130,9 +130,9 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line.
 
-        Bytes that a line does not accept at once wait, and are sent later. If a line always has
-        waiting bytes for 0.2 s, these bytes are discarded, and the line is regarded as missing. A
-        missing line gets only the bytes that it accepts at once.
+        Bytes that a line does not accept at once wait, and are sent later. If a line has had
+        waiting bytes for 0.2 s without a break, these bytes are discarded, and the line is regarded
+        as missing. A missing line gets only the bytes that it accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -203,9 +203,10 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write the waiting bytes. If some still wait, ``poll`` reports when the line accepts them.
+        """Write the waiting bytes.
 
-        A line that has not accepted all of them for 0.2 s (``WRITE_TIMEOUT_S``) is regarded as
+        If a line does not accept all of its bytes, ``poll`` reports when it accepts more. A line
+        that has had waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) without a break is regarded as
         missing.
         """
         with self._writing:
@@ -299,9 +300,9 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if there were always waiting bytes in the last 0.2 s.
+        """Write waiting bytes; return False if bytes have waited for 0.2 s without a break.
 
-        Before it returns False, the method discards all unsent bytes.
+        Before it returns False, the method discards all bytes that are not sent yet.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

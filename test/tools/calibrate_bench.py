@@ -20,7 +20,7 @@ STANDS_AFTER_S = 1.0
 
 
 class BenchRobot:
-    """A replacement for the ``Robot`` of a calibration, which drives in simulated time.
+    """A robot in simulated time that replaces the ``Robot`` of a calibration.
 
     ``bench.board``: the simulated board, with the true motion of the robot.
     """

@@ -151,9 +151,10 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The thread of the board fails. The error is RuntimeError with its cause, not a lost line.
+    """The thread of the board fails. A read then raises RuntimeError with the cause.
 
-    Closing the board raises the same error, and leaves nothing behind.
+    It does not raise the error of a lost line. Closing the board raises RuntimeError, too, and
+    leaves nothing behind.
     """
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:

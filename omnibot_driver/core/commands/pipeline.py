@@ -147,7 +147,7 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity. Raises CommandRefused if it is not allowed.
 
-        ``age_s``: age of the sender's stamp in s; shortens the time to expiry.
+        ``age_s``: age of the sender's stamp in s. The command expires earlier by this time.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s

@@ -2,11 +2,9 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-A pause and the driver's e-stop both send ``stop``. After an e-stop, the driver sends ``start`` by
-itself; after a pause, only if the user requests it.
-
-The module knows times and rcSource, the source of the commands that the board obeys; it does not
-know lines.
+For a pause, and for its own e-stop, the driver sends ``stop``. After an e-stop, it sends ``start``
+by itself. After a pause, it sends ``start`` only if the user requests it. The module knows times
+and rcSource, the source of the commands that the board obeys; it does not know lines.
 """
 
 import math

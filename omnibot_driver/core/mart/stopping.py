@@ -2,8 +2,9 @@
 
 """The stop of one motion: the commands to send until the server has acknowledged the stop.
 
-The network may deliver a stop before the start that it should end, so a single reply is not always
-a proof. This module knows commands, replies and times; it does not know why the robot is stopped.
+The network may deliver a stop command before the start command of the motion. Then the motion
+begins after the stop, so a single reply is not always a proof. This module knows commands, replies
+and times; it does not know why the robot is stopped.
 """
 
 import math

@@ -102,9 +102,10 @@ class TurnRecords:
 
 
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
-    """Return the angle of a turn in degrees, with the server's sign, from the pieces of its file.
+    """Return the angle of a turn in degrees, with the server's sign, from the file of the turn.
 
-    ``request``: the turn's command. Return None if the file records another turn or has no angle.
+    ``pieces``: content of the file. ``request``: the turn's command. Return None if the file
+    records another turn or has no angle.
     """
     for piece in pieces:  # the angle is in the first piece, so a later piece may be lost
         if head := _HEAD.match(piece):

@@ -15,10 +15,8 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Smallest number of averages from which an Allan deviation is computed.
-
-The longest averaging time is therefore one ninth of the record.
-"""
+"""Smallest number of averages from which an Allan deviation is computed. The longest averaging time
+is therefore one ninth of the recording."""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 58.0
 """Shortest recording, in s, from which the tool estimates bias instability and random walk.

@@ -93,7 +93,7 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
 
     ``slow``, ``fast``: motions with the command ``slow_mps`` and with twice this command.
 
-    If the motions fit neither method, return ``None``. For example, a busy computer may have
+    Return ``None`` if the motions fit neither method, for example because a busy computer has
     delayed commands.
     """
     # In velocity control the speed is constant, and doubles with the command. In positional control

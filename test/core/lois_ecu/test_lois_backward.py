@@ -130,7 +130,7 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> N
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM, some ticks follow the last one so soon that the firmware measures no speed.
+    """At 62 RPM, some ticks follow the previous tick so soon that the firmware measures no speed.
 
     The heading in the board's odometry (0x20) is then less accurate, so the filter adds variance to
     the yaw. At 32 RPM, it adds none.

@@ -296,10 +296,10 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """The outlier filter passes impossible displacements on, marked as such.
+    """The outlier filter passes some impossible displacements on, marked as such.
 
-    Four in a row are a fault. After a possible displacement, the count begins at zero again. After
-    the fault, the robot may roll out.
+    Four such displacements in a row are a fault. After a possible displacement, the count begins at
+    zero again. While the robot rolls out after the fault, there is no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)

@@ -133,9 +133,9 @@ def test_brush_lift_and_light_obey_and_the_estop_ends_brush_and_lift(
 def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """A lift command arrives while the driver is suspended.
+    """A lift command arrives while the driver is suspended. The driver refuses it afterwards.
 
-    It is refused, and the lift does not move. The base obeys the next velocity command.
+    The lift does not move. The base obeys the next velocity command.
     """
     before = robot.do(lambda board: board.vehicle.lift.height)
     lift = probe.publisher(Float32, "lift_cmd")

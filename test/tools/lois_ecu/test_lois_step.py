@@ -144,7 +144,7 @@ def test_records_that_are_too_short_are_refused() -> None:
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
     """An encoder has short and long ticks alternately, and the board has missed some edges.
 
-    The tool finds the corrections of both, whether the first tick is short or long.
+    The tool finds the correction of the short and of the long ticks, whichever kind comes first.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
