@@ -199,7 +199,10 @@ class MartTopics:
             self._timer.cancel()
 
     def _set_time(self) -> None:
-        """Set the controller's clock once, when measurements show that the robot is at rest."""
+        """Set the controller's clock if measurements show that the robot is at rest.
+
+        A timer calls this method repeatedly until the clock is set.
+        """
 
         def ask(session: Session, now: float) -> None:
             board = cast(MartBoard, session.board)

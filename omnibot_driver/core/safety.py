@@ -6,8 +6,8 @@
 * The board restarts, is paused, falls silent, or reports that the robot must be stopped.
 * This process was stalled.
 
-The command policy and the motion monitor have their own stops. This module does not know bytes, or
-who commands the robot.
+The command policy and the motion monitor stop the robot for other reasons. This module does not
+know bytes, or who commands the robot.
 """
 
 from typing import Final
@@ -145,7 +145,11 @@ class SafetyStops:
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """End the command after a short silence of the board. Forget the mode after a long one."""
+        """Check for how long the board has been silent, and react.
+
+        After a short silence (``unheard_s``), stop the robot. After a long silence (``silence_s``),
+        also forget the board's mode.
+        """
         liveness = self._liveness
         if self._policy.current and liveness.unheard(now):
             self._reporter.notify(self._commanding.stop_unheard(liveness.unheard_s, now))

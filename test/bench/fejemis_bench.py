@@ -138,8 +138,8 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     """Measure the delays; return an empty list, and the rows of a table.
 
-    For other boards, the list has comparisons with the floor, the smallest program with the same
-    output. This part has no such comparison.
+    For other boards, such a list has comparisons of the driver with the floor, the smallest program
+    with the same output. There is no floor for the Fejemis, so its list is empty.
     """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Comparison of the driver with the *floor*, which are measured in turn.
+"""Comparison of the driver with the *floor*.
 
-The floor is the smallest program with the same output, without any checks.
+The floor is the smallest program with the same output, without any checks. The driver and the floor
+are measured alternately.
 """
 
 from collections.abc import Callable, Sequence

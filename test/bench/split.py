@@ -4,7 +4,7 @@
 
 The driver's process imports this module first. When the process ends, the module writes a JSON
 object to the file in the environment variable SPLIT. The object contains the processor
-time of each stage, and as ``passed`` the time for which the reader ran, all in s.
+time of each stage, in s. Its entry ``passed`` is the time for which the reader ran, in s.
 """
 
 import atexit

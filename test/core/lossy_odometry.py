@@ -96,18 +96,18 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to command motion: the test wants to drive, and the board runs.
+        """Whether to command motion. This is so if the test wants to drive and the board runs.
 
-        Otherwise zeros are commanded. A paused board may mistake a byte of another command for a
+        If not, zeros are commanded: a paused board may mistake a byte of a motion command for a
         letter such as P.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property
     def error(self) -> Pose:
-        """Error of the newest odom pose.
+        """Error of the newest odom pose, compared with the true pose.
 
-        The truth is the board's own pose at the last delta that arrived.
+        The true pose is the board's own pose at the last delta that arrived.
         """
         wanted = self.attached.way_to(self.told)
         got = self.estimates[-1].pose

@@ -206,9 +206,9 @@ class Campaign(Outcome):
 
         The line continues to lose bytes during all stops.
 
-        ``number_of_life``: index of the group of stops (``LIVES``) that each driver performs.
+        ``number_of_life``: index of a group of stops in ``LIVES``. Each driver performs this group.
 
-        ``numbers``: one number for each driver, which selects the lost bytes.
+        ``numbers``: one number for each driver. The number selects which bytes are lost.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

@@ -39,7 +39,7 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 ``GAP_MPS2``: largest acceleration in a gap of data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
-"""If one byte in 100 is lost, one published message in this number is allowed to be wrong."""
+"""Number of published messages of which one may be wrong, if one byte in 100 is lost."""
 ENDS_WITHIN_S: Final = 2.0
 
 
@@ -282,7 +282,7 @@ class Rig:
 
         Also check that timestamps increase, and that the driver rejected no readings.
 
-        ``damaged_bytes``: whether a few wrong messages and rejected readings are allowed.
+        ``damaged_bytes``: if True, a few wrong messages and rejected readings are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

@@ -20,7 +20,7 @@ SOME_GOALS = (
 )
 """Names of the cases that this module tests. ``make faults`` runs all cases.
 
-test_position_control tests other cases without a real port.
+The module test_position_control has tests of other cases, without a real port.
 """
 
 
@@ -37,9 +37,9 @@ def goals(
 def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
     case: Callable[[GoalRig], None], goals: GoalRig
 ) -> None:
-    """An event discards the goal during a drive. The driver never sends this goal again.
+    """During a drive to a goal, an event such as a cut cable makes the driver discard the goal.
 
-    A new goal moves the robot.
+    The driver never sends this goal again. A new goal moves the robot.
     """
     case(goals)
     goals.expect_obeys_again()
@@ -47,7 +47,7 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_are_pursued_by_what_was_sent(goals: GoalRig) -> None:
-    """In the tests above, the driver has published no message that the board has not sent."""
+    """In the tests above, the board has sent every message that the driver has published."""
     goals.judge_stream()
     assert not goals.findings.take(), goals.driver.output
     assert goals.findings.published > 50

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Faults in random order, several of them at the same time, under random commands.
+"""Faults in random order, several of them at the same time, while random commands move the robot.
 
-Every few steps, the commands and the faults end, except a loss of bytes on the way to the board.
-The robot must come to rest, and then obey a fresh command.
+Every few steps, the commands and the faults end. Only damage to the bytes on the way to the board
+continues. The robot must come to rest. Then the damage ends too, and the robot must obey a fresh
+command.
 """
 
 from collections.abc import Callable

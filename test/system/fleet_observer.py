@@ -2,9 +2,10 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. This is a separate
-process because of Fast DDS: a process that was once a client of a discovery server can no longer
-find nodes without a server. Other tests in the same process would therefore fail.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set.
+
+With Fast DDS, a process that was once a client of a discovery server can no longer find nodes
+without a server. So a test does not do this in its own process: later tests there would fail.
 """
 
 import sys

@@ -5,7 +5,7 @@
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Number of control ticks that the user judges: the end of a motion and the halt after it."""
+"""Number of control ticks from which the user judges a motion: its end, and the halt after it."""
 
 
 class User:

@@ -76,9 +76,9 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """Planned commands are whole counts of the board, and do not exceed the speed ``top``.
+    """Each planned command is a whole number of the board's counts, and at most the speed ``top``.
 
-    Only a command of one count may exceed this speed.
+    Only if a single count is faster than ``top``, a command of one count exceeds ``top``.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -87,9 +87,9 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """While one speed is measured, commands are missing, so the driver may have stopped the robot.
+    """While the tool measures a speed, commands are missing. The driver may have stopped the robot.
 
-    The tool does not use the measurement of this speed.
+    So the tool does not use its measurement of this speed.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))

@@ -114,9 +114,9 @@ def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_b
 
 
 def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
-    """One channel is busy, and a datagram comes on the other.
+    """Nine datagrams wait on one channel, and one datagram waits on the other channel.
 
-    This datagram is read after at most two others.
+    At most two datagrams of the busy channel are read before the datagram of the other channel.
     """
     transport.write(((0, b"hello"), (1, b"hello")))
     drivers = [port.recvfrom(99)[1] for port in host.ports]

@@ -2,8 +2,8 @@
 
 """Speed limits for commands. They never change the direction of the linear velocity.
 
-``require_finite`` rejects NaN and infinity. Of the other functions, only ``SpeedLimits.allow``
-accepts these values.
+``require_finite`` rejects NaN and infinity. Call it first: the other functions must not get these
+values. The only exception is ``SpeedLimits.allow``.
 """
 
 import math

@@ -3,7 +3,7 @@
 """The stop proof: whether displacements show that the robot stands still after the last Stop.
 
 Boards do not acknowledge a stop. This module knows displacements and sent orders. It does not know
-what happens without proof. Time is an argument.
+what the driver does if no proof comes. Time is an argument.
 """
 
 import math
@@ -18,22 +18,28 @@ STILL_RADPS: Final = 0.03
 Two encoder counts in 40 ms are within these limits. The slowest command, 0.014 m/s, exceeds them.
 """
 STILL_S: Final = 0.1
-"""Default duration of standstill for a proof, in s. Three displacements of 40 ms exceed it."""
+"""Default duration of standstill that proves a stop, in s.
+
+Three displacements of 40 ms each last longer than this.
+"""
 SLACK_S: Final = 1e-6
-"""Tolerance for rounding, in s: in floating point, a sum of ten times 0.1 s is less than 1 s."""
+"""Tolerance in s for rounding errors: as floats, ten times 0.1 s add up to less than 1 s."""
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof.
 
 A single displacement could be damaged, or could have been measured before the wheels turned.
 """
 PROOFS: Final = 2.0
-"""Factor for the shortest wait for a proof: the wait is this factor times ``still_s``, the
-duration of standstill that proves a stop."""
+"""The driver waits for a proof for at least this factor times ``still_s``.
+
+``still_s`` is the duration of standstill that proves a stop.
+"""
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-If a displacement has a longer duration, earlier displacements were lost, and this one includes
-their motion. Its duration is then longer than the period.
+The period is taken from the duration of the newest displacement. If this duration is longer than
+``RAREST_S``, the displacement also contains the motion of earlier displacements, which were lost.
+Such a duration does not show the period.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
@@ -43,10 +49,10 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether a standstill is proved. The proof: since Stop, the robot has stood still
-      for ``still_s``, or the board has paused. A command to move or a measured motion ends
-      the proof.
-    * ``owed``: whether a motion was sent, and no standstill was proved since then.
+    * ``proved``: whether a standstill is proved. It is proved if, since Stop, the robot has stood
+      still for ``still_s``, or if the board has paused. A sent motion command or a measured motion
+      makes this False again.
+    * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
     * ``measured``: whether a measured displacement has arrived since Stop.
     """
 

@@ -22,8 +22,11 @@ MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit in degrees. Undetected damage can remove the minus sign, so that an angle to the right
-becomes a wrong angle to the left. The driver avoids a text whose wrong angle can reach the limit.
+"""Limit in degrees for a wrong angle that the board may read from a damaged line.
+
+If damage removes the minus sign, and the checksum does not detect this, an angle to the right
+becomes an angle to the left. The driver avoids texts from which the board may read such an angle of
+this size or more.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -35,7 +38,7 @@ class AngleRelay:
         self._owed_deg = 0.0
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
-        """Return the ``fwl`` line with the angle; ``sums``: whether the caller adds a checksum."""
+        """Return the ``fwl`` line with the angle. ``sums``: whether the caller adds a checksum."""
         wanted_deg = math.degrees(angle_rad) + self._owed_deg
         told_deg = max(-LARGEST_DEG, min(LARGEST_DEG, wanted_deg))
         # Without a checksum, the board detects no loss. A whole number never grows if a digit is

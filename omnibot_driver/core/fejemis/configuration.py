@@ -38,32 +38,36 @@ EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
 DIGIT: Final = 6e-4
-"""``NEAR`` (relative), ``DIGIT`` (absolute): limits for the difference between a written number and
-the number that the board reports. The larger limit applies, because boards print few digits."""
+"""``NEAR`` (relative) and ``DIGIT`` (absolute): limits for the difference between a written number
+and the number that the board reports. The larger of these two limits applies, because boards print
+few digits."""
 HALF: Final = 0.51
-"""A third limit for this difference, in units of the last digit that the board prints. It applies
-instead if it is smaller. It is a little more than half a unit, because the board's numbers have
-single precision."""
+"""Limit for the difference between a written number and the number that the board reports, in units
+of the last digit that the board prints. If this limit is smaller, it replaces ``NEAR`` and
+``DIGIT``. It is a little more than half a unit, because the board's numbers have single
+precision."""
 
 
 class Configuration:
     """Configuration of one board.
 
-    ``told``: the confirmed numbers, by the keyword of the line that reports them.
+    ``told``: the confirmed numbers, which the board has reported twice in a row. The keys are the
+    keywords of the lines that report the numbers, such as ``conf``.
     """
 
     def __init__(self, role: Role, written: Mapping[Written, tuple[float, ...]]) -> None:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers that the board reported last, by the keyword of the line. They may still need
-        confirmation by a second, equal report."""
+        """Numbers that the board reported last. The keys are the keywords of the lines. Numbers are
+        confirmed when the board reports the same numbers twice in a row."""
         self._digits: dict[str, tuple[float, ...]] = {}
-        """By keyword: the unit of the last digit of each number in the last line."""
+        """Units of the last printed digits of the numbers in a line. The keys are the keywords of
+        the lines; the values are those of the newest line."""
         self.turned = False
-        """Whether the board's ``confs`` line (steering geometry) begins with the track.
+        """Whether the track is the first number in the board's ``confs`` line (steering geometry).
 
-        According to the board's help text, the track comes last.
+        According to the board's help text, the track is the last number.
         """
         self.written = written
         self.begin()
@@ -93,7 +97,7 @@ class Configuration:
 
     @property
     def failed(self) -> list[Written]:
-        """Settings that the board has not confirmed; empty while they are still being written."""
+        """Settings that the driver could not write to the board; empty while it still tries."""
         return self._unwritten() if self._next_at == math.inf else []
 
     @property

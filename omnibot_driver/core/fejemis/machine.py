@@ -20,13 +20,19 @@ BRUSH_AGAIN_S: Final = 1.0
 """Period in s at which ``brush 1`` is repeated while the brush is on, because a line may be lost.
 """
 PACE_S: Final = 0.05
-"""Shortest time in s between two lift lines, or two light lines. Of the commands in this time, only
-the newest is sent. A stop of the lift is sent at once."""
+"""Shortest time in s between two lines for the lift, or between two lines for the lights.
+
+If several commands come within this time, only the newest is sent. A stop of the lift is sent at
+once.
+"""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Smallest ratio of the sent to the wanted voltage of the lift. A lower voltage is sent if the
-checksum could not detect damage to the line with the wanted voltage."""
+"""Smallest ratio of the lift voltage that the driver sends to the voltage that the user commands.
+
+The driver sends a lower voltage than commanded if the checksum could not detect damage to the line
+with the commanded voltage.
+"""
 LEAST_TIME_S: Final = 0.04
 
 

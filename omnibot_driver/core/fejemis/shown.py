@@ -12,8 +12,11 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of unknown lines that the diagnostics show. These are the latest lines from the
-driver that the firmware does not know."""
+"""Largest number of lines that the diagnostics show as unknown to the firmware.
+
+The driver has sent these lines, and the firmware has answered that it does not know them. The
+diagnostics show the latest ones.
+"""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

@@ -37,10 +37,11 @@ QUIET_S: Final = 0.05
 The board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest time between two lines of a group, as a fraction of the time between the marker lines of
-this group and of the previous group with the same command byte.
+"""Factor for the longest allowed time between two lines of a group.
 
-The longest time between two lines is at least ``QUIET_S`` and at most ``LATE_S``.
+The longest allowed time is this factor times the time between two marker lines: that of this group,
+and that of the previous group with the same command byte. However, it is at least ``QUIET_S`` and
+at most ``LATE_S``.
 """
 
 # Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the
@@ -87,9 +88,9 @@ class Assembler:
 
     @property
     def resolves_at(self) -> float:
-        """Time at which a held group is returned if no line follows it.
+        """Time in s at which the held group is returned if no further line comes.
 
-        Infinity if no group is held, or if lines of the held group may still be missing.
+        It is infinity if no group is held, or if lines of the held group may still be missing.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -161,11 +162,14 @@ class Assembler:
         self._code, self._payloads, self._done, self._astray = code, [], False, False
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Return whether a line that looks like a marker may be a value of -1 in the group."""
+        """Return whether a line that looks like a new marker may be a value of the current group.
+
+        A marker and the value -1 have the same payload.
+        """
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _may_be_complete(self) -> bool:
-        """Return whether the held group may be complete, by its number of lines and its values."""
+        """Return whether the held group may be complete, judged by its number of lines."""
         if self._code is None or self._done:
             return False
         if len(self._payloads) not in _LENGTHS[Code(self._code)]:

@@ -55,9 +55,8 @@ class RecordReading(Unstamped):
 class RecordComes:
     """Notification that lines of a record are arriving.
 
-    It is also returned if the driver has already given up the record.
-
-    The board takes up to 1.3 s to send a record.
+    It also comes for a record that the driver has already given up, because the board still sends
+    this record. The board takes up to 1.3 s to send a record.
     """
 
 

@@ -54,9 +54,9 @@ class SizeErrors:
         ]
 
     def covariance(self, yaw_rad: float) -> Covariance:
-        """Return the covariance for a pose with the yaw ``yaw_rad``.
+        """Return the covariance of the pose in a coordinate frame in which its yaw is ``yaw_rad``.
 
-        The pose may be in another coordinate frame than the copies, rotated by a constant angle.
+        The frame may be rotated by a constant angle, relative to the frame of the copies.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

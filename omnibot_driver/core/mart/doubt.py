@@ -18,9 +18,9 @@ WAY_STDDEV: Final = 0.004
 The standard deviation grows with the square root of the distance.
 """
 GYRO_WALK: Final = 0.002
-"""Standard deviation in rad of the heading after 1 s of motion, which shakes the gyro.
+"""Standard deviation in rad of the heading after 1 s of motion, because motion shakes the gyro.
 
-It grows with the square root of the time (random walk).
+The standard deviation grows with the square root of the time (random walk).
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that is measured only by the right wheel."""
@@ -47,15 +47,15 @@ STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 BEND_WALK: Final = 0.5
 """Random error of a turn that is computed from the commands, as a fraction of its constant error.
 
-Both errors are standard deviations. An error of the assumed wheel speed ratio causes the constant
-error: it has the same sign in all intervals between two encoder counts. The random error is
-independent in each interval.
+Both errors are standard deviations. The constant error comes from an error of the assumed wheel
+speed ratio. It has the same sign in all intervals between two encoder counts. The random errors of
+different intervals are independent.
 """
 ASTRAY: Final = 0.7
-"""How much an uncertain heading increases the error of a driven distance.
+"""Factor for the error of a driven distance that an uncertain heading causes.
 
-The relative error of the distance is ASTRAY times the variance of the heading (rad²), at most 1. It
-applies along the motion and across it.
+The relative error of the distance is this factor times the variance of the heading (rad²), but at
+most 1. There is an error of this size along the motion, and another one across it.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
@@ -95,7 +95,8 @@ class Doubt:
 
         ``heading_rad``: heading before the displacement, in the odometry frame.
 
-        ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn.
+        ``bend``: standard deviation of the wheel speed ratio from which the turn was computed; 0 if
+        the turn was measured.
 
         ``aside_m``: standard deviation of the position across the motion, in m.
         """
@@ -130,17 +131,18 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the current constant heading error of computed turns, because a motion begins.
+        """Store the constant heading error of all computed turns so far, because a motion begins.
 
-        ``heading_told`` later removes the constant error that this motion has added.
+        If the server reports the heading during this motion, ``heading_told`` goes back to the
+        stored error. This removes the constant error that the motion has added.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove a part of this motion's heading error, because the server now reports the heading.
+        """Remove the constant heading error of this motion: the server now reports the heading.
 
-        Until now, the turn was computed from the commands. Its constant heading error is removed.
-        Its random heading error and the resulting position error remain.
+        Until now, the turn of this motion was computed from the commands. The random heading error
+        of this turn remains, and so does the position error that the turn has caused.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -192,7 +194,7 @@ class Doubt:
     def total(self, more: Errors) -> Covariance:
         """Return the covariance of the pose.
 
-        ``more``: further errors, from the time since the last encoder count.
+        ``more``: errors that arose after the last encoder count, and are not stored here.
         """
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
         size, bias, *others = self._levers

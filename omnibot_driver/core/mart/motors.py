@@ -15,16 +15,17 @@ from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_UNITS: Final = 127
 SLOWEST_TURN_RADPS: Final = 0.01
-"""Slowest turn on the spot, in rad/s, from which the driver learns."""
+"""Slowest turn on the spot, in rad/s, from which the driver learns about the motors' speeds."""
 UNEQUAL: Final = 0.04
 """Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
 """Largest difference between the assumed ratio of the motors' speeds and ``motor_balance``."""
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
-"""Fewest units at which the speeds of the two motors are compared.
+"""Smallest number of motor units for which the ratio of the two motors' speeds is computed.
 
-For slow motors, an error of a ``MotorLine`` would change the ratio too much.
+For fewer units, the ratio for this number is used: at low speeds, an error of a ``MotorLine`` would
+change the ratio too much.
 """
 
 
@@ -64,8 +65,8 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
-        ``seen_radps``: the measured rate of the current turn, which uses ``units``. The driver
-        does not learn from this rate here.
+        ``seen_radps``: the measured rate of the current turn, which uses ``units``. It changes
+        only the result of this method; ``spun`` learns from measured rates.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
@@ -81,7 +82,7 @@ class Motors:
         return copy.copy(self._right_line), copy.copy(self._left_line)
 
     def restore(self, lines: Lines) -> None:
-        """Forget what the driver has learned since ``lines`` were copied."""
+        """Forget what the driver has learned since ``lines()`` returned these ``lines``."""
         for line, before in zip(self._lines, lines, strict=True):
             line.restore(before)
 
@@ -96,8 +97,8 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of the motors' speeds (left / right) if both motors have ``units``.
 
-        Lost or duplicate speed changes can make the motor lines wrong. So the ratio is limited
-        to ``motor_balance`` ± MOST_UNEQUAL.
+        If the network loses or duplicates a request to change the speed, the driver can learn a
+        wrong ``MotorLine``. So the ratio is limited to ``motor_balance`` ± MOST_UNEQUAL.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
@@ -107,7 +108,10 @@ class Motors:
         return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
     def _mean_speed(self, units: float) -> float:
-        """Return the mean speed of both motors at these motor units: nominal units, at least 0."""
+        """Return the mean speed of both motors if both have these motor units.
+
+        The speed is in nominal units, and at least 0.
+        """
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
@@ -124,7 +128,10 @@ def _units(lines: Lines, speed: float) -> int:
 
 
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
-    """Learn from the mean speed of both motors, by changing both lines by the same amounts."""
+    """Learn from ``speed``, the mean speed of both motors in a turn on the spot with ``units``.
+
+    The turn does not show the speed of each motor, so both motor lines change by the same amounts.
+    """
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2
     slope, offset = right.slope, right.offset

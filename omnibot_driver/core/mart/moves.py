@@ -22,14 +22,15 @@ from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
 UNLIKELY: Final = 1 / 3
-"""Assumed error of the odometry if a second run of a move is possible, but improbable.
+"""Assumed error of a move in the odometry, if a second run of the move is possible, but improbable.
 
-It is a standard deviation, as a fraction of the move. A second run would then be an error of three
-standard deviations.
+It is a standard deviation, as a fraction of the move. If the second run has really happened, the
+error is the whole move, which is three standard deviations.
 """
 RAN_TWICE: Final = (
-    "the network has delivered a controlled move twice; the driver has stopped the second run. The"
-    " first run was not measured, so `odom` uses its expected distance or turn: check the network"
+    "the network has delivered a controlled move twice, and the driver has stopped the second run"
+    " of the move. The first run was not measured, so `odom` contains the expected distance or turn"
+    " of the move instead: check the network"
 )
 CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"
@@ -122,8 +123,8 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move by how much such moves exceed the requested distance or turn.
 
-        On a good network, the driver first downloads the server's record of a turn, because this
-        record is more exact than the wheel's measurement.
+        After a turn on a good network, the driver downloads the server's record of the turn, and
+        learns later from this record. The record is more exact than the wheel's measurement.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -206,11 +207,11 @@ class Moves(Asking):
         )
 
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
-        """Return whether the stops after a controlled move may have stopped a second run of it.
+        """Return whether the driver may have stopped a second run of a controlled move.
 
         The result is False if the driver has sent no stop after the move. It is also False if the
-        move was complete and the server answered again very soon: sooner than a stop can end a
-        second run, and sooner than a second run can end by itself.
+        move was complete and the server answered again very soon. In such a short time, a stop
+        cannot end a second run, and a second run cannot end by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
@@ -230,8 +231,9 @@ class Moves(Asking):
             return
         self._move.fail()
         self._notice(
-            "the server did not answer in time after a controlled move, so the driver has stopped a"
-            " possible copy of it; the driven distance is unknown, so the goal of cmd_pose is"
-            " discarded: check the network, then send the goal again",
+            "the server did not answer in time after a controlled move. The network may have"
+            " delivered the move twice, so the driver has stopped a possible second run. The driven"
+            " distance is unknown, so the goal of cmd_pose is discarded: check the network, then"
+            " send the goal again",
             halt=True,
         )

@@ -19,10 +19,10 @@ NO_CORRECTION: Final = 0.0
 class TurnAngle:
     """The angle of the current turn on the spot, or of the last one.
 
-    Some methods return a correction, which the caller adds to the pose's heading, in rad.
+    Some methods return a correction in rad, which the caller adds to the heading of the pose.
 
-    ``spun_rad``: the turn of the robot, as the wheel measured it; after ``record``, the recorded
-    turn.
+    ``spun_rad``: the turn that the wheel has measured. If ``record`` has accepted an angle, it is
+    this angle instead.
     """
 
     def __init__(self) -> None:
@@ -39,9 +39,10 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def add(self, turn_rad: float) -> float:
-        """Add a turn measured at the wheel; return the part of it that the pose lacks.
+        """Add a turn measured at the wheel; return the angle by which the pose must be turned.
 
-        This part is zero if the server has already reported the angle of the turn.
+        This angle is zero if the server has already reported the angle of the whole turn, because
+        the pose then contains the reported angle.
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0
@@ -54,7 +55,7 @@ class TurnAngle:
     def end(self, *, may_be_recorded: bool) -> float:
         """End the turn after its last count; return the correction of the heading.
 
-        The turn that the wheel measured replaces an implausible angle that the server has reported.
+        If the server has reported an implausible angle, the wheel's measurement replaces it.
 
         ``may_be_recorded``: whether the server may have recorded the turn.
         """
@@ -82,7 +83,9 @@ class TurnAngle:
 
 
 def is_of_another(wrong_rad: float, spun_rad: float) -> bool:
-    """Return whether a reported angle is too far from the measured turn to be of the same motion.
+    """Return whether a reported angle must be the angle of another motion.
+
+    This is so if the angle differs too much from the measured turn.
 
     ``spun_rad``: the turn that the wheel measured. ``wrong_rad``: difference between this turn and
     the reported angle.

@@ -130,13 +130,13 @@ TD = _word("TD", Kind.QUERY, _INTEGER, 0.05, {"in progress"})
 
 NO_IMU: Final = "could not init"
 RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
-"""The check of the IMU without a motion.
+"""The command that checks the IMU without a motion.
 
-After a failure, the server no longer uses the IMU until the command succeeds. So the driver repeats
-it.
+If the check fails, the server does not use the IMU until this command succeeds. So the driver
+repeats the command.
 """
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
-"""The check of the IMU for servers without RST IMU: a turn by 0 degrees.
+"""The command that checks the IMU on servers that do not know RST IMU: a turn by 0 degrees.
 
 Some servers start the motors on this command.
 """

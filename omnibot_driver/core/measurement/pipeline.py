@@ -53,7 +53,8 @@ class MeasurementPipeline:
             settings.motion, period_s or 0.0, corrected=board.traits.own_odometry
         )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
-        """Reads that are not counted yet: for each, its readings and the newest one's age in s."""
+        """Reads that are not counted yet: the readings of each read, and the age in s of the newest
+        of these readings when it arrived."""
         self.undigested: list[Stamped] = []
         """Stamped readings that wait for ``flush``."""
 
@@ -86,9 +87,10 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that these readings make possible. ``now``: time of arrival.
+        """Process readings that arrived at ``now``; return the IMU estimates that result from them.
 
-        Readings of another kind, and IMU readings after them, wait for ``flush``.
+        Readings that are not from the IMU wait for ``flush``. IMU readings that come after a
+        waiting reading also wait.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

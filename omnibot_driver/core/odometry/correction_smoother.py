@@ -31,9 +31,10 @@ class CorrectionSmoother:
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Move ``target`` by the correction ``chord``, which is given in the axes of ``target``.
+        """Move ``target`` by ``chord``, a correction in the axes of ``target``.
 
-        ``pose`` follows within ``spread_s``, or later if the robot could not move as fast.
+        ``follow`` then moves ``pose`` to ``target`` within ``spread_s``. It takes longer if the
+        robot could not move so fast.
         """
         self.target = self.target.moved(chord)
         self._settling_s = spread_s
@@ -41,7 +42,8 @@ class CorrectionSmoother:
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
         """Move ``pose`` and ``target`` by a displacement in the robot's own axes.
 
-        ``room_m``, ``room_rad``: the most that the robot can have moved in this step.
+        ``room_m``, ``room_rad``: largest distance and angle by which the robot can have moved in
+        this step.
         """
         pose, target = self.pose, self.target
         self.target = target.moved(chord)
@@ -50,9 +52,9 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` by as much of it as is allowed.
+        """Move ``target`` by a displacement, and ``pose`` by the part of it that is allowed.
 
-        ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
+        ``room_m``, ``room_rad``: largest allowed distance and angle for ``pose``.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
@@ -60,10 +62,10 @@ class CorrectionSmoother:
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Move ``pose`` by the part of the correction that is due after ``seconds``.
+        """Move ``pose`` towards ``target``, by the part of the correction due after ``seconds``.
 
-        ``move`` has used a part of the motion that is possible in this step. The correction uses at
-        most the remainder.
+        In this step, the robot can have moved only by a certain distance and angle. ``move`` has
+        used a part of them, and the correction uses at most the remainder.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

@@ -158,8 +158,9 @@ class Uncertainty:
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
-        The fastest speeds limit the motion in the gap. If the robot accelerates and brakes in time
-        t with acceleration a, it deviates by at most a·t²/4 from a motion at constant speed.
+        The uncertainty is the deviation from a motion at constant speed. If the robot accelerates
+        and then brakes in time t with acceleration a, this deviation is at most a·t²/4. The fastest
+        speeds also limit the deviation.
         """
         square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(
@@ -172,11 +173,11 @@ class Uncertainty:
         self.gap = NOTHING
 
     def give_up(self) -> None:
-        """Keep the uncertainty of all gaps permanently: the motion in them stays unknown."""
+        """Make the uncertainty of all gaps permanent, because the motion in them stays unknown."""
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
-        """Return the covariance of a pose whose known error ``open_error`` is not yet corrected."""
+        """Return the covariance of a pose that still has the known error ``open_error``."""
         noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip

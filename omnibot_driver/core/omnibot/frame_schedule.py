@@ -21,8 +21,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: position in the sequence after a frame of ``kind``, if the position before
-    the frame was ``at``.
+    ``after[kind][at]``: the new position in the sequence when a frame of ``kind`` arrives at the
+    position ``at``. It is the position after the next frame of ``kind`` in the sequence.
     """
 
     def __init__(self, *kinds: Kind) -> None:
@@ -59,8 +59,10 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: discarded bytes before the frame. For a pose, return 0: the losses before a
-        pose are in the next result.
+        ``skipped``: number of discarded bytes before the frame.
+
+        For a pose, the result is always 0. IMU frames that were lost before a pose are counted in
+        the result for the next frame of another kind.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

@@ -2,10 +2,10 @@
 
 """The pauses in which the line was idle, and whether they show where frames begin.
 
-A *pause* is a time in which no bytes are read; it is not the board's paused mode. A board pauses
-only between frames. Two other causes of a pause between reads are an adapter that collects bytes,
-and a computer that reads late (``late_reads``). Accepted frames show whether the pauses of this
-line are only between frames.
+A *pause* is a time in which no bytes are read; it is not the board's paused mode. A pause has one
+of three causes: the board sends nothing, which happens only between frames; an adapter collects
+bytes; or the computer reads late (``late_reads``). The decoder passes the ends of the accepted
+frames to this module. These ends show whether this line pauses only between frames.
 
 Input: positions of bytes and times; this module does not know what a frame contains.
 """
@@ -38,8 +38,10 @@ TICK_BYTES: Final = 14 + 9 + 15
 """Largest number of bytes that the board sends in one tick (10 ms). If more bytes come in a read
 after a pause, the read was late."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses between frames after which the board is assumed to cause the pauses, not an
-adapter."""
+"""Number of pauses between frames from which on the board is regarded as their cause.
+
+With fewer pauses, an adapter may be the cause.
+"""
 
 _FIRST: Final = attrgetter("first")
 
@@ -49,11 +51,11 @@ class InterFrameGaps:
 
     * ``byte_s``: time in s that the line takes for a byte.
     * ``sharp``: whether the first byte after a pause normally begins a frame.
-    * ``between``: whether a frame normally begins somewhere in the read after a pause.
-    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. Further
-      confirmations are then not counted.
-    * ``at_pace``: whether the last read's bytes came without idle time before them.
-    * ``collected``: whether an adapter collected the last read's bytes for more than a tick.
+    * ``between``: whether the read after a pause normally contains the beginning of a frame.
+    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. If so, further
+      confirmations are not counted.
+    * ``at_pace``: whether the line was not idle between the previous read and the last one.
+    * ``collected``: whether an adapter collected the bytes of the last read for more than a tick.
     """
 
     def __init__(self, byte_s: float) -> None:
@@ -94,10 +96,10 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Learn from a read of complete frames that this line pauses between frames.
+        """Record a pause between frames, before a read that contains only complete frames.
 
-        Nothing is learned if the line was not idle before the read. ``pause_s``: time in s since
-        the previous read. ``arrived``: number of bytes in the read.
+        If the line was not idle before the read, there was no pause, and nothing is recorded.
+        ``pause_s``: time in s since the previous read. ``arrived``: number of bytes in the read.
         """
         if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
@@ -133,7 +135,7 @@ class InterFrameGaps:
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
         """Return whether only later bytes can show the cause of a pause in ``data[start:end]``.
 
-        False if an idle line certainly caused another pause there.
+        The result is False if an idle line certainly caused another pause in these bytes.
         """
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
@@ -143,7 +145,10 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether the bytes from ``start`` on came after a pause, all within half a tick."""
+        """Return whether the bytes from ``start`` on came within half a tick, just after a pause.
+
+        The pause must not be longer than ``LATE_S``.
+        """
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
                 came = next(read.now for read in self._reads if read.end > start)

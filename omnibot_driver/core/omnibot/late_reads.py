@@ -39,20 +39,24 @@ NEAR_S: Final = 2e-3
 If bytes were lost, later frames seem late by a whole number of ticks.
 """
 INTO_TICK_S: Final = 1e-3
-"""Time in s from the beginning of a tick to a delta or pose. An IMU frame comes first in each
-tick."""
+"""Time in s from the beginning of a tick until the board sends a delta or a pose. First, the board
+sends the IMU frame of the tick."""
 PUNCTUAL_S: Final = 1e-3
 """The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Tolerance in s when the time in which bytes arrived is compared with the time that the line needs
-for them. If the two times differ by less, the bytes arrived at the pace of the line, so they had
-not waited to be read."""
-FEW_BYTES: Final = 2
-"""The pace at which bytes arrive can be measured only with more bytes than this."""
-TICKS_TO_PROVE: Final = 2
-"""After a first late tick, this number of further late ticks proves that bytes were lost.
+"""Tolerance in s for the comparison of two times: the time in which bytes arrived, and the time
+that the line needs to send them.
 
-Each of these ticks must be in a read of its own, and be as late as the first.
+If the two times differ by less than this tolerance, the bytes arrived as fast as the line sends
+them. So they did not wait for the reader.
+"""
+FEW_BYTES: Final = 2
+"""How fast bytes arrive can be measured only if there are more bytes than this number."""
+TICKS_TO_PROVE: Final = 2
+"""Number of late ticks after a first late tick that prove that bytes were lost.
+
+Each of these ticks must be in a separate read, and must be as late as the first late tick. After a
+pause of ``IDLE_S`` or more, one such tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Number of bytes after a frame within which the cause of a pause in the frame must be found.
@@ -87,9 +91,9 @@ _END: Final = attrgetter("end")
 class Gap(NamedTuple):
     """A pause between two reads, caused by an idle line or by a late reader.
 
-    * ``first``, ``before``: the place of the pause. It is directly before one of the bytes
-      ``first`` to ``before`` - 1.
-    * ``price``: cost of a frame that contains the pause, if the line was idle.
+    * ``first``, ``before``: the place of the pause among the bytes held. The pause is directly
+      before one of the bytes at the positions ``first`` to ``before`` - 1.
+    * ``price``: cost of the assumption that a frame contains the pause, if the line was idle.
     * ``pause_s``: time in s between the two reads.
     """
 
@@ -166,10 +170,10 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause within a frame. It is inferred from the next frame, at ``start``.
+    """Return the cause of a pause within a frame, found from the next frame, at ``start``.
 
-    The line was idle if the next frame also contains a pause, and the ends of the two pauses are a
-    whole number of ticks apart. ``first``: the read that ended the pause in question.
+    The line was idle if the next frame also contains a pause, and the two pauses end a whole number
+    of ticks apart. ``first``: the read that ended the first of the two pauses.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

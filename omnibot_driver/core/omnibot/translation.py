@@ -35,19 +35,21 @@ from omnibot_driver.core.readings import (
 DELTA_LSB: Final = 1e-4
 """Size of one count of a delta: 0.1 mm in m, or 0.1 mrad in rad."""
 MOST_TEXTS_LOST: Final = 9
-"""Largest number of lost "Paused" texts that a counter may show.
+"""Largest number of "Paused" texts that may have been lost, according to the counter in the texts.
 
-The board sends one text a second, and answers a reset within 9 s. So a counter that seems to show
-more lost texts has restarted.
+The board sends one text a second, and answers a reset within 9 s. So if the counter seems to show
+that more texts were lost, the board has restarted.
 """
 FULL: Final = 4000
-"""Smallest number of bytes, decoded after one read, at which the kernel's buffer of 4 KiB may have
-been full. The number is below 4096, because the decoder may keep some bytes of a read for later."""
+"""If this many bytes are decoded after one read, the kernel's buffer of 4 KiB may have been full.
+
+The number is below 4096, because the decoder may keep some bytes of a read for later.
+"""
 BEHIND_S: Final = 0.5
 """If a read is late by more than this time, in s, the driver checks whether the next read is late.
 
-The next read is late if sending its bytes took the board longer than ``BURST_S`` plus twice the
-time between the two reads.
+The next read is regarded as late if the board needed more time to send its bytes than ``BURST_S``
+plus twice the time between the two reads.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
@@ -81,7 +83,7 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """``_most_singles``: the initial value of ``singles_to_come``."""
+        """``_most_singles``: value of ``singles_to_come`` before the fast path decoded a frame."""
         self.heard_s = -math.inf
         self._behind_s = 0.0
         """Time in s from the sending of the last byte to the read that returned it."""
@@ -89,8 +91,10 @@ class Translation:
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Return the readings of the frames that were completed by one read at the time ``now``.
 
-        ``skipped``: number of discarded bytes before each frame. The arrival time of each frame is
-        estimated from its place in the read, because bytes arrive one by one.
+        ``found``: the completed frames. ``skipped``: number of discarded bytes before each frame.
+
+        Bytes arrive one by one, so the arrival time of a frame is estimated from its place in the
+        read.
         """
         self._catch_up()
         lengths = [LENGTH.get(type(frame), 0) for frame in found]
@@ -112,8 +116,9 @@ class Translation:
         """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
         If the read was not late, return ``now``. Before a late read, the kernel's buffer may have
-        been full: it kept the first bytes and lost later ones. So the bytes of a late read were
-        sent directly after those of the previous read. Emptying the buffer may take several reads.
+        become full. A full buffer keeps its bytes and loses the bytes that come later. So the board
+        has sent the bytes of the late read directly after those of the previous read. The driver
+        may need several reads to empty the buffer.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S

@@ -28,7 +28,8 @@ class Chassis:
     x_m, y_m, yaw_rad: the true pose, yaw unwrapped.
     counts: encoder counts since the last reset.
     way_m: total distance, forward and backward.
-    volts, stuck, motor_status, silent: set them only by ``change``.
+    silent: whether the serial line to the motor board is cut.
+    volts, stuck, motor_status and silent may be set only by ``change``.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -141,7 +142,7 @@ class Chassis:
     def _turn(
         self, wanted: int, applied: float, speed_mps: float, gain: float
     ) -> tuple[float, float]:
-        """Return a motor's applied effort and speed in m/s after another 10 ms."""
+        """Advance one motor by 10 ms; return its applied effort and its speed in m/s."""
         if applied != wanted:
             slew = self.acceleration * RAMPS_PER_S * STEP_S
             if applied < wanted:

@@ -136,7 +136,10 @@ class World:
         )
 
     def _wired(self, pwm: Wheels) -> Sequence[float]:
-        """Return the efforts that reach the motors of wheels A, B, C, as the motors are wired."""
+        """Return the efforts at the motors of wheels A, B, C, after swaps in the wiring.
+
+        ``pwm``: the efforts of the three controllers.
+        """
         if self._wiring == _AS_NUMBERED:
             return pwm
         reached = [0.0] * 3

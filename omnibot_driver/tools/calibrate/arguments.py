@@ -35,8 +35,8 @@ NEEDS: Final = {
 }
 """For each subcommand: the names of driver parameters, and a text for the error message.
 
-The driver must have at least one of these parameters. If it has none of them, the board lacks the
-thing that the text names.
+The driver must have at least one of these parameters. Otherwise the subcommand does not work with
+the board, and the error message says that the board does not have what the text names.
 """
 
 

@@ -25,11 +25,11 @@ from omnibot_driver.tools.needs import ToolError
 FOUND_WITHIN_S: Final = 5.0
 ANSWER_WITHIN_S: Final = 12.0
 SPIN_S: Final = 0.005
-"""Time, in s, for which the executor waits for a message.
+"""Time, in s, for which one call of the executor waits for a message.
 
-It is constant, because rclpy's executor takes turns between the subscriptions only if each call has
-the same timeout. Otherwise, on a busy computer, the executor would handle only the IMU's messages,
-and not those of the e-stop.
+All calls have this same timeout: only then does rclpy's executor take turns between the
+subscriptions. With different timeouts on a busy computer, the executor would handle only the IMU's
+messages, and not those of the e-stop.
 """
 
 

@@ -153,7 +153,7 @@ class Walk:
     def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
         """Drive at ``slow_mps``, then twice as fast; return both motions and the control method.
 
-        The control method is that of the board: velocity or position.
+        The method is velocity control or position control, as selected by the board's switch.
         """
         for _ in range(TRIES):
             log = self._drive(

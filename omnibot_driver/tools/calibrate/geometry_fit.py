@@ -22,9 +22,9 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Assumed relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
-"""Largest accepted relative error of an assumed radius.
+"""Largest accepted relative difference between a fitted radius and the assumed radius.
 
-If the error is larger, the readings are regarded as wrong.
+If the difference is larger, the user's measurements are regarded as wrong.
 """
 
 

@@ -23,7 +23,7 @@ from omnibot_driver.tools.calibrate.whitening import correlation, whitener
 Column = NDArray[np.float64]
 
 SIGMA: Final = 0.1
-"""Assumed relative noise of a time between ticks, until the positions of the marks are known."""
+"""Assumed relative noise of a time between ticks, until the encoder's marks are fitted."""
 SHARPEST: Final = 0.002
 """Least relative noise of a time between ticks. The board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
@@ -44,14 +44,14 @@ MOST_OFF: Final = 0.4
 LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered.
 
-Even such distant residuals are correlated, because the load changes slowly.
+Even residuals so far apart are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
 """If the relative errors of two successive times sum to more than this, the board missed a mark.
 
-A missed mark doubles the first time. Its error is then 1, and so is the sum. The board's clock can
-lose up to 6 ms, which makes the sum smaller. If the board only noticed a mark late, the first time
-is too long and the second too short, so the sum is near 0.
+If the board misses a mark, the first time is twice as long as expected. Its error is 1, and so is
+the sum. The board's clock can lose up to 6 ms, which makes the sum smaller. If the board only
+notices a mark late, the first time is too long and the second too short, so the sum is near 0.
 """
 SURE_TICKS: Final = 4
 """The tool does not search for missed marks among this number of ticks at the start of a record.
@@ -140,7 +140,7 @@ class Search:
     def first_order(self, values: Column) -> Column:
         """Set ``order`` to 1, and search for a plant of first order.
 
-        ``values``: the values of second order, from which the search starts.
+        ``values``: the values of a plant of second order, from which the search starts.
         """
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
@@ -197,8 +197,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals at these values; later searches remove it.
 
-        Before the marks are fitted, uneven marks cause the correlation. After their fit, only the
-        changing load causes correlation.
+        As long as the marks are not fitted, their uneven distances cause the correlation. After
+        the fit, only the changing load causes it.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -217,8 +217,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the plant's own values, which are the same in all records.
 
-        A slowly changing load affects whole records. If the records therefore scatter more than
-        the residuals predict, the covariance is increased to this scatter.
+        The load changes slowly, so it can differ from record to record. If the records scatter
+        more than the residuals predict, the covariance is increased to this scatter.
         """
         own = 1 + self.order
         found = self._search(values)

@@ -102,7 +102,7 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """The board ignores all commands after the release of the e-stop, until it is reset.
+    """After the release of the e-stop, the board ignores all commands until the board is reset.
 
     One notice advises the user to call ~/reset.
     """

@@ -102,7 +102,10 @@ def test_stop_never_waits(stream: Stream) -> None:
 
 
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
-    """A new command may have to wait after another new command, but not after a repetition."""
+    """The driver has just repeated the last command when a new command arrives.
+
+    It sends the new command at once. Only after another new command, it may have to wait.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(1.05) == GO
@@ -191,9 +194,9 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """The command of one topic expires, and the driver sends Stop.
+    """The command of one topic expires, so the driver sends Stop.
 
-    When another topic commands the robot later, the driver does not send a second Stop.
+    Later, another topic commands the robot. The driver sends no other Stop before this command.
     """
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
@@ -217,7 +220,10 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A command is discarded together with the Stop that was due. The driver writes nothing."""
+    """A command ends, so the driver must send Stop. But both are discarded before that.
+
+    The driver writes nothing.
+    """
     order(stream, GO, 1.0)
     stream.halt(1.0)
     stream.discard(1.0)
@@ -228,7 +234,7 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
     """The pacer, the thread that repeats commands, stalls for a minute while a command is active.
 
-    It then sends Stop instead of the expired command.
+    After the stall, the pacer sends Stop, because the command has expired.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

@@ -44,7 +44,7 @@ def within(errors: list[float]) -> float:
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
     """Lines arrive late, and some are lost. Apart from a constant delay, the stamps are right.
 
-    Of the stamps of poses, 99 % are right within 0.05 ms; of those of IMU samples, within 0.2 ms.
+    99 % of the pose stamps are right within 0.05 ms, and 99 % of the IMU stamps within 0.2 ms.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
@@ -115,8 +115,9 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
     """The first line is read late. Afterwards, every read brings two lines, sent 20 ms apart.
 
-    Compared with the first line, the newer line of each read seems to arrive early. The clock
-    rejects the board times of at most three lines, and is right afterwards.
+    At first, the clock knows only the delay of the first line, which is too long. So the newer line
+    of each read seems to arrive early. The clock rejects the board times of at most three lines,
+    and is right afterwards.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -130,9 +131,10 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 
 
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
-    """Every third board time is damaged in the same digit, so the damaged times fit each other.
+    """Every third board time is damaged: it is 0.1 s too large. The damaged times fit each other.
 
-    The correct times between them are smaller, which shows the damage. The clock stays right.
+    But after each damaged time, a smaller, correct time comes. This shows the damage, and the clock
+    stays right.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -244,7 +246,8 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
     """Stamps must increase only among readings of the same kind.
 
-    A reading of another kind has an earlier stamp, which is not changed.
+    A reading has an earlier stamp than the reading before it, but is of another kind. So its stamp
+    is not changed.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -253,9 +256,10 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """Old lines waited before the port was opened. After them, the board's time jumps ahead.
+    """The first lines are old: they waited before the port was opened.
 
-    The clock follows without reporting a restart, because a restart would set the time back.
+    After the old lines, the board's time jumps ahead. The clock follows the jump. It does not
+    report a restart of the board, because a restart would set the board's time back.
     """
     clock = TeensyClock()
     for n in range(20):
@@ -306,7 +310,8 @@ def numbered() -> Bench:
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
     """Return, for each published sample, the cycles of its gyro line and its acceleration line.
 
-    The value for a cycle is its number divided by 1000, as in the lines from ``numbered``.
+    A cycle is a period of the board. It is returned as its number divided by 1000, because
+    ``numbered`` writes it like this into the lines.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
@@ -317,8 +322,9 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
-    """A read every 100 ms has ten samples. In some cases, 1 % of the lines is lost or comes twice.
+    """The driver reads every 100 ms, so each read has ten samples.
 
+    In the case "lost", 1 % of the lines is lost. In the case "twice", 1 % of the lines comes twice.
     No published sample has lines of two cycles.
     """
     bench = numbered()

@@ -18,7 +18,7 @@ TRACK_M = 0.47
 
 
 class Told:
-    """The odometry of a robot with constant set-points. The test invents the board's reports.
+    """The odometry of a robot with constant set-points. Each test invents the reports.
 
     ``rpm``: set-points of the left and the right wheel in RPM.
     """
@@ -56,8 +56,8 @@ class Told:
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
     """The robot drives a curve backward, and no report arrives for a while.
 
-    The set-points do not change, so the motion is known. The heading is right, and its standard
-    deviation grows by a few degrees only.
+    The set-points do not change, so the driver knows the motion. The standard deviation of the
+    heading grows by less than 10°, and the error of the heading is less than 10° too.
     """
     rig = Rig(nominal("firmware"), HOST_GAINS)
     rig.run(4.0)
@@ -89,10 +89,10 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 
 
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
-    """Most reports are lost. In the others, the speed of the right wheel is always the same.
+    """Most reports are lost. All reports that arrive have the same speed of the right wheel.
 
-    The board repeats the last speed of a wheel at rest, so this wheel may be at rest. The estimated
-    heading is then wrong. Its standard deviation is at least half of this error.
+    The board repeats the last speed of a wheel at rest. So the right wheel may be at rest, and the
+    estimated heading may be wrong. Its standard deviation is at least half of this error.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -110,10 +110,10 @@ def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports
 def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
     right_rpms: tuple[int, ...], more_deg: float
 ) -> None:
-    """In a drive backward, reports are lost for 0.9 s. The wheels may have changed their speeds.
+    """In a drive backward, reports are lost for 0.9 s. The wheels may then change their speeds.
 
-    The standard deviation of the heading grows more than without the gap. It grows even more if the
-    speed of a wheel swings.
+    So the standard deviation of the heading grows more than without this gap. It grows even more if
+    the speed of a wheel has swung before the gap.
     """
 
     def grown_deg(gap_s: float) -> float:
@@ -130,10 +130,11 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 def test_a_large_correction_by_the_heading_of_0x20_is_not_exact(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Reports are lost while the wheels start. The next one shows a turn that was not expected.
+    """Reports are lost while the wheels start. The next report shows an unexpected turn.
 
-    The odometry corrects its heading by the board's odometry (0x20). The filter is linear, but the
-    motion of starting wheels is not. So the covariance includes an error of this correction.
+    The odometry corrects its heading by the heading in the board's odometry (0x20). This correction
+    has an error, because the filter is linear, but the motion of starting wheels is not. The
+    covariance includes the error.
     """
 
     def stddev_deg() -> float:

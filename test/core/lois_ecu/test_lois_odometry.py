@@ -49,9 +49,9 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """In a forward drive, the odometry names "ticks" as its source.
+    """The odometry names the source of its estimates. In a forward drive, the source is "ticks".
 
-    In a backward drive, the public firmware counts no ticks. The odometry then names "commands and
+    In a backward drive, the public firmware counts no ticks, so the source is "commands and
     heading".
     """
     rig = settled(firmware)
@@ -114,9 +114,9 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The displacements of the estimates add up to the driven distance, within 3 %.
+    """The displacements in all odometry estimates add up to the driven distance, within 3 %.
 
-    From one estimate to the next, the pose moves at most 3 cm farther than at a speed of 1 m/s.
+    Between two estimates, the pose moves at most as far as at a speed of 1 m/s, plus 3 cm.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
@@ -200,9 +200,10 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """The odometry predicts motion between two tick reports. Then the user changes a setting.
+    """Between two tick reports, the odometry predicts motion, and then the user changes a setting.
 
-    The second report does not add the predicted motion again.
+    The second tick report also counts the predicted motion. The pose contains this motion only
+    once.
     """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
@@ -221,9 +222,9 @@ def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """The wheels stop while the board is silent. The odometry still predicts motion.
+    """The wheels stop while the board sends nothing, so the odometry predicts too much motion.
 
-    The next ticks show a shorter distance. The pose is corrected to this distance.
+    The next tick counts show the true distance. The pose is corrected to this distance.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -258,9 +259,9 @@ def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """The robot drives backward by duty, so its motion is estimated from the commands alone.
+    """The robot drives backward by duty. The odometry estimates this motion from commands alone.
 
-    The standard deviation of the distance is more than 20 % of the distance.
+    So the distance is uncertain: its standard deviation is more than 20 % of the distance.
     """
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
@@ -294,7 +295,8 @@ def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
 ) -> None:
     """With the board's own gains, a wheel's speed may oscillate between two reports.
 
-    If more ticks come than expected, the variance of a predicted speed therefore increases.
+    More ticks than expected are a sign of this. So after a report with more ticks than expected,
+    the odometry increases the variance of a predicted speed.
     """
 
     def variance() -> float:

@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """A speed of 0.2723 m/s is sent as 20 RPM. ``meaning`` converts a line back to a twist."""
+    """The driver encodes a speed of 0.2723 m/s as 20 RPM. ``meaning`` decodes a line to a twist."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -87,9 +87,10 @@ def encode_command_duty(left: int, right: int) -> bytes:
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """After a Stop, RPM 0/0 is sent before each of the first three set-points.
+    """After a Stop, the driver sends RPM 0/0 before each of the first three set-points.
 
-    Without RPM 0/0, a wheel at rest might never start.
+    RPM 0/0 makes the firmware forget the measured speed of a wheel at rest. Otherwise this wheel
+    might never start.
     """
     ecu = started()
     drive = b":020014001438\n"

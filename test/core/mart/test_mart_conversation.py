@@ -116,8 +116,8 @@ def test_no_late_ok_proves_the_imu() -> None:
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
     """A late ok to another command could be taken for the ok to RST IMU, the check of the IMU.
 
-    So the driver sends RST IMU so late that such an ok arrives before the earliest possible reply
-    to RST IMU.
+    So the driver waits before it sends RST IMU. It waits so long that such a late ok arrives before
+    the earliest possible reply to RST IMU.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -134,8 +134,8 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     """The reply to a sonar query has not come in time, but may still come.
 
-    The driver delays the next sonar query. It sends the encoder query (ENC) at once, but regards
-    the reply as doubtful.
+    So the driver delays the next sonar query. It sends the encoder query (ENC) at once, but regards
+    the reply to this query as doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -156,7 +156,8 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 def test_every_motion_is_stopped_by_its_own_word() -> None:
     """Each motion has its own stop command, which the driver uses first.
 
-    The stop command of a controlled move goes to the stop port, those of other motions do not.
+    For a controlled move, the stop command goes to the stop port. For all other motions, the stop
+    command goes to the command port.
     """
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
@@ -216,8 +217,9 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
     """The driver sends a start, then a stop, then a second stop.
 
-    The first stop may arrive before the start, so its reply proves nothing. For 0.6 s after the
-    first stop, each reply may be a copy of this reply. The driver believes only a later reply.
+    The first stop may arrive before the start, so the reply to the first stop proves nothing. The
+    network may duplicate this reply: for 0.6 s after the first stop, any reply may be a copy of it.
+    Only a reply after this time proves a stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -311,9 +313,9 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """A forward drive (RM) sets the heading to zero, but the first reply still has the old heading.
+    """A forward drive (RM) sets the heading to zero, but the next reply still has the old heading.
 
-    This reply is late, so its heading is not used.
+    So this reply is late, and the odometry does not use its heading.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
@@ -327,9 +329,10 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """A check of the IMU answers ``ok`` only after some time. A failure may come at once.
+    """The server needs some time to check the IMU. So an early ``ok`` is not a reply to the check.
 
-    For example, the IMU may be missing. So the driver accepts an early failure.
+    But the server may report a failure at once, for example if the IMU is missing. So the driver
+    accepts an early failure.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -22,11 +22,14 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(8))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """One datagram is lost, late or doubled. The server does not hang, and the robot rests.
+    """In each trial, one datagram is lost, late or doubled, or the IMU dies.
 
-    If the IMU dies instead, no motion begins more than 0.25 s later, and the robot rests or the
-    server is reported lost. Each seed is one trial with two wishes. The eight seeds together
-    include each of the four faults, and each wish as the first wish of a trial.
+    If a datagram has the fault, the server does not hang, and the robot is at rest at the end. If
+    the IMU dies, no motion begins more than 0.25 s later. At the end, the robot is at rest, or the
+    driver has reported that it has lost the server.
+
+    Each seed is one trial with two wishes of a user. The eight seeds together include each of the
+    four faults, and each wish as the first wish of a trial.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))
@@ -46,9 +49,10 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during a forward drive, and its first command that arrives is SL (stop port).
+    """A driver starts during a forward drive. Its first command that arrives is SL (stop port).
 
-    The driver then does not send SRM, the usual stop, which would hang the server.
+    After SL has arrived, the driver does not send SRM, the usual stop of a forward drive: SRM would
+    hang the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
@@ -60,7 +64,7 @@ Patch = Callable[[Any, str, Any], None]
 def sweeps_again(patch: Patch) -> None:
     """Patch the driver to send the stops SRM and SM after it has used the stop port.
 
-    The patched driver does not first find out which motion is in progress.
+    Without the patch, the driver first finds out which motion is in progress.
     """
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 

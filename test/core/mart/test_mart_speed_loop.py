@@ -40,9 +40,10 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 ) -> None:
     """The measured speed of a motor is right at 18 units, and too low at 26 units.
 
-    A straight line through both speeds would show motion at zero units, which is impossible. The
-    driver's line shows no such motion, but is too low at 14 units. Then the true, higher speed at
-    14 units is measured. This measurement must not lower the line there.
+    A straight line through both speeds would show motion at zero units, which is impossible. So the
+    driver uses another line, which shows no such motion, but is too low at 14 units. Then the true
+    speed at 14 units is measured, which is higher than the line. This measurement must not make the
+    line lower at 14 units.
     """
     line = MotorLine()
     for _ in range(8):
@@ -125,9 +126,9 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """A start does not move the robot. The next starts use three times its units, but at most 20.
+    """A start does not move the robot. The next starts use three times as many units, at most 20.
 
-    A start with 30 units that fails does not raise the units of the next starts.
+    If a start with 30 units does not move the robot, the next starts do not use more units.
     """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4

@@ -24,10 +24,10 @@ MOST_NEES = 16.3
 def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
     stuck: Stuck, first_s: float
 ) -> None:
-    """A wheel gets stuck during a turn to a goal. The server ends the turn by the gyro.
+    """A wheel gets stuck during a turn to a goal. The server measures the turn only by the gyro.
 
-    The right wheel shows another angle. So the driver discards the goal, and the covariance covers
-    the difference.
+    The right wheel shows another angle than the gyro. So the driver discards the goal, and the
+    covariance covers the difference between the two angles.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 0.0, 2.6)
@@ -63,10 +63,10 @@ def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> Non
 def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
     vx: float, yaw_rate: float
 ) -> None:
-    """The right wheel is stuck. So at each start the left wheel alone moves, until the start fails.
+    """The right wheel is stuck. At each start, only the left wheel turns, and the start fails.
 
-    After three starts the driver refuses this motion until the command ends. When the wheel is
-    free, a new command moves the robot again.
+    After three starts, the driver refuses this motion until the user's command ends. When the wheel
+    is free, a new command moves the robot again.
     """
     bench = MartBench("source").ready()
     bench.server.chassis.change(stuck="right")

@@ -93,7 +93,8 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
     """One word of the readings jumps and stays there, as when a robot is set down on a slope.
 
-    All readings are released. The first one after the jump is released one reading late.
+    The filter releases all readings. It holds the first reading after the jump until the next
+    reading arrives.
     """
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
@@ -104,9 +105,9 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, values of another frame replace the force along z and the gyro's values.
+    """In one reading, the force along z and the gyro's values come from another frame.
 
-    This reading is rejected.
+    The filter rejects this reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
@@ -129,9 +130,10 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A knock saturates the sensor, so a reading is at the end of the 2 g scale.
+    """A knock saturates the sensor, so the value of one reading is at the end of the scale, 2 g.
 
-    One changed bit in a usual reading cannot give this value. So the reading is released.
+    A single changed bit in a usual reading cannot cause this value. So the filter releases the
+    reading.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -140,9 +142,9 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """The value of a bit depends on the scale of the sensor (``full_scale_mps2``).
+    """The value of a bit in m/s² depends on the scale of the sensor (``full_scale_mps2``).
 
-    A reading jumps by the value that a high bit has at the given scale. The reading is rejected.
+    A reading jumps by the value that a high bit has at the given scale. So the filter rejects it.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -180,7 +182,8 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement is faster than 2 m/s or 8 rad/s, so it is rejected.
 
-    The next displacement reports it as lost, in addition to all other losses.
+    The next displacement reports one more lost displacement: the rejected one. It also reports the
+    losses that the rejected displacement has reported.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -189,9 +192,9 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """A displacement is rejected, and a pose comes next. The pose reports the rejected one as lost.
+    """A displacement is rejected. A pose comes next, and reports the rejected displacement as lost.
 
-    The next displacement does not report it again.
+    So the displacement after the pose does not report this loss again.
     """
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
@@ -210,9 +213,9 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """The speed jumps and stays high, so the jump may be real.
+    """The speed jumps and stays high. The jump may be real, so the filter releases all readings.
 
-    The first displacement after the jump is released late.
+    It holds the first displacement after the jump until the next displacement arrives.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
@@ -232,9 +235,9 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """A rejected displacement reports a restart of the board, or has an unknown duration.
+    """A rejected displacement reports a restart of the board, and has an unknown duration.
 
-    The next displacement is released with this restart or this unknown duration.
+    The filter passes both facts on: the next displacement has them.
     """
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
@@ -276,8 +279,8 @@ readings = st.one_of(
 def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
     """Accepted readings keep their order and values.
 
-    A rejected reading is removed. Only its losses, its restart and its unknown duration are added
-    to a later reading.
+    A rejected reading is removed. But if it reports losses, a restart or an unknown duration, a
+    later reading reports them.
     """
     through = gate()
     came = list(chain(*admitted(given, through)))
@@ -354,8 +357,8 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
     """A board's own odometry corrects itself by a step that is too large for any robot.
 
-    A filter with ``corrected=True`` releases the step, but marks it as neither ``measured`` nor
-    ``possible``. Only a step that is not finite is rejected.
+    A filter with ``corrected=True`` releases the step, with ``measured=False`` and
+    ``possible=False``. It rejects only a step that contains NaN or infinity.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

@@ -61,7 +61,10 @@ def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> N
 
 
 def test_the_twist_is_the_true_one() -> None:
-    """The board assumes wrong sizes. With the right odometry scales, the twist is the true one."""
+    """The board assumes wrong sizes of its wheels and its base.
+
+    With the right odometry scales, the twist is the robot's true twist, within 2 %.
+    """
     on = bench(TRUE)
     on.drive(0.2, 0.1, 0.4)
     on.run(3.0)
@@ -76,8 +79,9 @@ def test_the_twist_is_the_true_one() -> None:
 
 
 def test_what_has_rolled_is_the_true_way() -> None:
-    """The board assumes wrong sizes. With the right odometry scales, the rolled distance is right.
+    """The board assumes wrong sizes of its wheels and its base.
 
+    With the right odometry scales, the distance that the robot has rolled is right, within 2 mm.
     The joint angles are computed from this distance.
     """
     on = bench(TRUE)
@@ -90,9 +94,9 @@ def test_what_has_rolled_is_the_true_way() -> None:
 
 
 def test_a_goal_in_odom_is_reached_in_truth() -> None:
-    """The board assumes wrong sizes. The user sends a goal in odom.
+    """The board assumes wrong sizes of its wheels and its base. The user sends a goal in odom.
 
-    With the right odometry scales, the robot truly reaches the goal.
+    With the right odometry scales, the robot's true pose reaches the goal, within 5 mm.
     """
     on = bench(TRUE, control="position")
     on.go_to(0.6, -0.4, 0.0)

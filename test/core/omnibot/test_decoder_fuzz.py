@@ -27,7 +27,7 @@ times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
     """Check that ``stream`` contains the frames of ``found`` in order.
 
-    Frames are compared as text: a NaN of a pose is not equal to itself.
+    Frames are compared as text, because a NaN in a pose is not equal to itself.
     """
     at = 0
     for frame in found:
@@ -85,9 +85,10 @@ def test_all_frames_between_silences_come_in_any_chunks(
 @settings(max_examples=40)
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """Calm frames come: the content of each fits that of the frame before it.
+    """The frames are calm: each frame is similar to the last frame of the same kind.
 
-    Each is returned with its last byte, unless this byte may begin a header.
+    The decoder returns a frame as soon as its last byte arrives, unless this byte may begin a
+    header.
     """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
@@ -104,7 +105,8 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
     """A robot in free fall sends an IMU frame with an acceleration word of -6, -5 or -4.
 
-    The bytes of -6 look like a header. Only the frame with -6 is lost, and only below 0.5 g.
+    The bytes of -6 look like a header. So the decoder loses the frame with -6, but no other frame.
+    A frame is lost like this only below 0.5 g.
     """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
@@ -203,7 +205,7 @@ def test_work_is_linear_and_memory_bounded(
 def test_no_repeated_pattern_costs_much_more_than_another(
     pattern: bytes, chunk_length: int
 ) -> None:
-    """Any pattern is repeated. The work for each byte is bounded."""
+    """A stream repeats a pattern. For all patterns, the work for each byte has the same bound."""
     stream = pattern * (1000 // len(pattern))
     with pytest.MonkeyPatch.context() as patch:
         sums, _ = work(patch, stream, chunk_length)

@@ -130,7 +130,7 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
     """A «Paused: i» text ends with other white space than in the manual. It is still decoded.
 
-    Another version of the firmware may send it.
+    The reason: another version of the firmware may send such a text.
     """
     assert decode(text) == PausedFrame(3)
 

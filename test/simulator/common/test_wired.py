@@ -25,7 +25,7 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """The line of the front wheel loses all bytes. The line of the drive still loses none."""
+    """The line of one channel (front) loses all bytes. The line of the other (drive) loses none."""
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -69,10 +69,10 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """A datagram is sent at 1000 s of the caller's clock, and delayed by up to 1 s.
+    """The caller sends a datagram at 1000 s of its own clock. The network delays it by up to 1 s.
 
-    The board's clock is different. The board receives the datagram with an arrival time by the
-    caller's clock.
+    The board's clock shows another time. But the arrival time that the board gets with the datagram
+    is a time of the caller's clock.
     """
     at: list[float] = []
 

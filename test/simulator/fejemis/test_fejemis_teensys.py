@@ -323,7 +323,10 @@ def test_options_reach_the_board_by_a_url() -> None:
     ],
 )
 def test_a_wrong_option_is_refused(wrong: str) -> None:
-    """A wrong option is refused. An example is a fault of the angle sensor in the drive half."""
+    """A URL with a wrong option is refused.
+
+    An example of a wrong option is a fault of the angle sensor in the drive half.
+    """
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{wrong}", options.load(MODULE))
 

@@ -6,8 +6,8 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are random, as those of ``judge_step.py``. A *mark* is a place on the encoder's disc at
-which the board counts a tick. The calculation is for three kinds of noise:
+The robots are chosen at random, as in ``judge_step.py``. A *mark* is a place on the encoder's
+disc at which the board counts a tick. The calculation is for three kinds of noise:
 
 - "each time": every time between ticks has an independent error of 10 %.
 - "other marks": the marks are displaced by 10 %, differently in each turn.
