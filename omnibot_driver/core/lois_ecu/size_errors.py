@@ -2,8 +2,9 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-Copies of the robot's path are computed with each error, once positive and once negative. The spread
-of their final poses is the covariance.
+The robot's path is computed again for each error, once with a positive and once with a negative
+error. These copies of the path end in different poses, and the spread of these poses is the
+covariance.
 
 Input: distances of the wheels; output: covariance of x, y and yaw.
 """

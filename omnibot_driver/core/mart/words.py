@@ -181,7 +181,7 @@ WORDS: Final = (
     *(RM, B, R, L, RMCS, CS),
     *(SRM, SM, SL, SS, TF, TB, MCR, MCL, SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT),
 )
-"""All commands of the table. The driver sends each of them, except TD."""
+"""All commands that are described by a ``Word``. The driver sends each of them, except TD."""
 KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if text)
 
 NEVER_SAID: Final = {

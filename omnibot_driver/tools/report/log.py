@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The messages from one robot, as columns. Times are in seconds since the beginning of the log."""
+"""The messages from one robot, in arrays with one column for each value.
+
+Times are in seconds since the beginning of the log.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -161,9 +161,9 @@ def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
 
 
 def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
-    """Some examples have a motion in SI units as a remark.
+    """The remark of some examples is a motion in SI units.
 
-    The driver encodes it as the example's bytes.
+    If the driver encodes this motion, the result is the bytes of the example.
     """
     wishes = [
         (example, [float(part.split()[0]) for part in example.remark.split(",")])
