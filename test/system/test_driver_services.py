@@ -11,7 +11,7 @@ import pytest
 from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from probe import Answer, Probe
+from probe import Probe
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
@@ -252,13 +252,14 @@ def test_while_a_reset_waits_estop_answers_and_another_request_is_refused(
     board = start_board(boot_time_s=4.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
-    estop, pause = probe.client(SetBool, "estop"), probe.client(SetBool, "pause")
+    for service in ("estop", "pause"):
+        probe.client(SetBool, service)  # discovered before the reset
     reset = probe.call_async(Trigger, "reset")
     assert board.wait_for(lambda b: b.mode is BoardMode.BOOTING, PATIENCE_S)
-    answer = Answer(pause, SetBool.Request(data=True)).wait()
+    answer = probe.call_async(SetBool, "pause", data=True).wait()
     assert not answer.success
     assert "reset is under way" in answer.message
-    assert Answer(estop, SetBool.Request(data=True)).wait().success
+    assert probe.call_async(SetBool, "estop", data=True).wait().success
     assert not reset.arrived
     assert reset.wait().success
 
