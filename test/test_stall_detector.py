@@ -2,8 +2,9 @@
 
 """Tests of the stall detector.
 
-It finds stalls of the pacer, the thread that repeats commands, and commands that waited in a stall.
-A command is *refused* if ``outlived_by`` returns False for it.
+The stall detector finds stalls of the pacer, which is the thread that repeats commands. It also
+tells which commands may have waited during a stall: ``outlived_by`` returns False for them. The
+tests call such a command *refused*.
 """
 
 import pytest

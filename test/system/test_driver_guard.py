@@ -52,7 +52,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def hang(driver: Driver, board: PtyBoard) -> int:
-    """Suspend the driver, and return the number of bytes that the board has received from it."""
+    """Suspend the driver. Return how many bytes the board has received from it until then."""
     driver.process.send_signal(signal.SIGSTOP)
     stat = Path(f"/proc/{driver.process.pid}/stat")
     wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T")

@@ -150,7 +150,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
     """``--help`` explains how to give parameters.
 
-    This option works without any library. Its exit code is 0.
+    This option also works without rclpy and pyserial. Its exit code is 0.
     """
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)

@@ -38,7 +38,7 @@ of the interval that contains 99 % of the stamps' errors."""
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
-    """Stamp one stream, in a process of the pool. Return its case and its result."""
+    """Stamp one stream, in a process of the pool. Return the case and the result."""
     (line, loss, mode, event), seed = job
     skew = SKEWS[seed % len(SKEWS)]
     stamped = stamp(line, SCENARIOS[mode], loss, skew, seed, seconds, event)

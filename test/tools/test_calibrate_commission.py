@@ -78,7 +78,7 @@ def test_a_speed_limit_is_not_taken_for_positional_control(
 ) -> None:
     """``max_linear_speed`` is below a speed that the tool needs. The tool asks for a higher limit.
 
-    With the low limit, the driver would reduce the faster of the tool's commands. The tool would
+    With the low limit, the driver would slow down the tool's fast commands. The tool would
     mistake this for positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:

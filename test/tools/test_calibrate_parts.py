@@ -53,7 +53,7 @@ def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
 
 
 def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
-    """Return a console with these answers, in order, and the text that it shows."""
+    """Return a console that reads these answers, and the buffer to which it writes its texts."""
     shown, left = io.StringIO(), list(answers)
     return Console(yes=yes, read=lambda _question: left.pop(0), file=shown), shown
 

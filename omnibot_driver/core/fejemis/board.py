@@ -228,7 +228,7 @@ class FejemisBoard(Board):
     # Outbound
 
     def actuator(self, proof: StopProof) -> PairStream:
-        """Create the set-point stream for both boards."""
+        """Create the actuator: the stream that repeats each set-point to both boards."""
         self._actuator = PairStream(self._encoder, proof, self)
         return self._actuator
 

@@ -84,7 +84,8 @@ class Encoder:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
         True while the angle limits the speed, because the limit changes with the angle. Also true
-        without checksums, so that a damaged line is replaced after 15 ms, the period of the angles.
+        without checksums: the board may obey a damaged line, which the next angle's lines replace
+        after 15 ms.
         """
         return self.held or not self._pair.with_sums
 

@@ -27,7 +27,7 @@ UNTIL_IT_MOVES: Final = (
 )
 UNTIL_START: Final = (
     "the front wheel did not go where it was commanded, for the second time within 60 s; check the"
-    " servo and its power (for reverse motion, see `allow_reverse`), then call ~/start"
+    " servo and its power (in reverse, set `allow_reverse` to false), then call ~/start"
 )
 
 

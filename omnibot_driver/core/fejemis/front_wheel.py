@@ -106,7 +106,7 @@ class FrontWheel:
         """Return whether the wheel can have reached the angle.
 
         The first angle is always accepted. Later, an angle is rejected if it is too far from the
-        last accepted angle. If the next angle is near the rejected angle, it is accepted.
+        last accepted angle. The next angle is accepted if it is near the rejected one.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

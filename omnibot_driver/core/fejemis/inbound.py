@@ -151,7 +151,7 @@ class Inbound:
         if self._angle_told(front.angle_rad, now):
             self._told.halt(
                 "the front wheel does not go where it is commanded; robot stopped. Check the servo"
-                " and its power; for reverse motion, see `allow_reverse`",
+                " and its power. If this happens in reverse, set `allow_reverse` to false",
                 now,
             )
 

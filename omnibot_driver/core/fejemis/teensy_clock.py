@@ -21,8 +21,10 @@ is implausible."""
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
 WAITED_S: Final = 1.0
-"""Time in s from the first line after a stall of the driver. In this time, any delay of a line is
-plausible."""
+"""Length in s of a period that begins with the first line after a stall of the driver.
+
+In this period, a line is accepted however late it is, because it may have waited during the stall.
+"""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1

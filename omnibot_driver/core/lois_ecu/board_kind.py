@@ -49,7 +49,8 @@ class BoardKind:
     def took_odometry(self, *, appended: bool) -> None:
         """Record an odometry report.
 
-        ``appended``: whether the report has the command byte of ticks, as in the public firmware.
+        ``appended``: whether the report has the command byte of a tick report (0x12), as in the
+        public firmware, instead of its own (0x20).
         """
         motion = self._motion
         if appended and not self.appends:

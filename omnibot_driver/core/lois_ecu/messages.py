@@ -280,8 +280,8 @@ class BoardOdometry:
 
     Both are in a coordinate frame that is fixed to the floor. Velocities may be NaN or infinite.
 
-    ``appended``: whether the report has the command byte of ticks (0x12), as in the public
-    firmware.
+    ``appended``: whether the report has the command byte of a tick report (0x12), as in the public
+    firmware, instead of its own (0x20).
     """
 
     x_m: float

@@ -39,9 +39,12 @@ the errors of the arrival times are too large."""
 ROLLED_OUT_TURNS: Final = 0.15
 ROLLED_OUT_TICKS: Final = 1
 STARTING_TURNS_PER_S: Final = 1 / 3
-"""Largest count that a wheel can reach within ``age`` s after a restart of the board. In this time,
-the wheel rolls out, and may start again. The limit is ``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S *
-age`` turns, plus ``ROLLED_OUT_TICKS`` ticks."""
+"""``ROLLED_OUT_TURNS``, ``ROLLED_OUT_TICKS``, ``STARTING_TURNS_PER_S``: limit of a wheel's count
+after a restart of the board, which counts from zero again.
+
+The wheel may still roll out, and may start again. At ``age`` s after the restart, the limit is
+``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, plus ``ROLLED_OUT_TICKS`` ticks.
+"""
 
 ClockUnit = Literal["ms", "ns"]
 

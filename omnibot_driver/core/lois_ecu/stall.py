@@ -85,7 +85,10 @@ class StallWatch:
         now: float,
         resting: tuple[bool, bool] = (False, False),
     ) -> None:
-        """Process a report. Ticks show forward motion; the board's odometry shows backward motion.
+        """Process a report: ticks, or the board's odometry.
+
+        Ticks show whether a wheel turns that is commanded forward. The board's odometry shows
+        whether a wheel turns that is commanded backward.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """

@@ -78,7 +78,7 @@ Only a restarted server answers HELLO during the move.
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
 
-At rest, the server answers ``fail`` and does nothing.
+While the robot is at rest, the server answers ``fail`` and does nothing, so a stop is harmless.
 """
 
 

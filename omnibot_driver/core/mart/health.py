@@ -64,8 +64,8 @@ class Health:
 
     ``reference_fails``: number of starts of RM in a row that have failed.
 
-    ``outlived``: whether the server has answered a stop only after the stop port was used. In that
-    case, the next stop can fail.
+    ``outlived``: whether the server answered a stop late, after the driver had used the stop port.
+    If so, the next stop can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -148,7 +148,10 @@ class Health:
             self.status = bits
 
     def outlives(self) -> None:
-        """Record that the server answers a stop only after the stop port was used."""
+        """Record that the server answered a stop late, after the driver had used the stop port.
+
+        The stop port may still wait for the end of that motion, and hang in the next one.
+        """
         self.outlived, self._may_be_restarted = True, False
 
     def restarted(self) -> None:
@@ -257,7 +260,10 @@ class Health:
                 " then the driver"
             )
         if self._defective:
-            return "this server answers 'fail' to RM although the robot moves: update the server"
+            return (
+                "this server answers 'fail' to RM (drive forward) although the robot moves: update"
+                " the server"
+            )
         return ""
 
     def obstacle(self, motion: Motion, now: float) -> bool:

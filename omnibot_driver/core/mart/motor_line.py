@@ -69,9 +69,9 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Record that the motor does not turn with ``units``.
+        """Record that the motor does not turn with ``units``. This can lower the offset.
 
-        Afterwards the offset is uncertain again, because an obstacle may have held the robot.
+        The offset is then as uncertain as at first, because an obstacle may be the true cause.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2

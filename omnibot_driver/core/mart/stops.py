@@ -316,7 +316,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _learn_standing(self) -> None:
-        """Record that the current motor units are too small to turn the motors."""
+        """Record that the motor units now in use are too small to turn the motors."""
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:

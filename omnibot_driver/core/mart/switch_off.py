@@ -19,7 +19,7 @@ RELEASE: Final = MSM.request()
 """The request that ends the direct control of the motors by MCS. Without MCS, it does nothing."""
 
 MOST_MISSES: Final = 4
-"""Number of unanswered requests in a row after which the driver stops trying."""
+"""Number of unanswered requests after which the driver no longer tries to switch off the motors."""
 NO_MCS: Final = (
     "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"
     " on after a straight move: if the robot creeps, send it a turn, or cut the motor power"

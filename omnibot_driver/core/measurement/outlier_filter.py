@@ -91,7 +91,7 @@ class OutlierFilter:
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. If so, the filter does not reject
       an impossible but finite displacement. It passes the displacement on with ``measured`` False.
-      If the displacement has a duration, its ``possible`` is False too.
+      ``possible`` is False too, unless ``duration_s`` is None or 0.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -135,7 +135,10 @@ class OutlierFilter:
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
-        """Return the waiting readings, because no later reading will contradict them."""
+        """Return the waiting readings, because the stream has ended or paused.
+
+        No later reading can show that they are spikes.
+        """
         released = [*self._held_imu, *self._held_motion]
         self._held_imu, self._held_motion = [], []
         self._imu_leaps.forget()

@@ -30,7 +30,7 @@ from omnibot_driver.core.omnibot.late_reads import (
 LATE_S: Final = 0.011
 """Longest normal pause in s between two reads: about one tick.
 
-A longer pause shows lost bytes, an adapter that collects bytes, or a late reader.
+A longer pause shows lost bytes, an adapter that collects bytes, or a late read.
 """
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""

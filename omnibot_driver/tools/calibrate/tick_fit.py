@@ -65,8 +65,10 @@ class PlantFit:
     samples: int
     order: int
     marks: Marks | None = None
-    """Distances between the encoder's marks. None if the marks seem to be evenly spaced: in that
-    case, no pattern of position errors repeats with each turn."""
+    """Distances between the encoder's marks; None if the marks are assumed to be evenly spaced.
+
+    They are, if the errors of the times between ticks have no pattern that repeats with each turn.
+    """
 
     @property
     def aic(self) -> float:

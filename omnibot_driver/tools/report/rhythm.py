@@ -27,7 +27,7 @@ LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Longest time in s in which short steps between timestamps can compensate a long step.
+"""Longest time in s after a long step between timestamps in which short steps can compensate it.
 
 If the short steps come later, messages are regarded as missing.
 """

@@ -126,10 +126,11 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """The board reads no angle beyond 90°, although rounding errors are added to later angles.
+    """The board reads no angle beyond 90°.
 
-    This is also true in two cases of damage: two characters of a line are lost and the checksum
-    does not detect it, or one character of a line without a checksum is lost.
+    The driver adds the rounding error of each angle to the next angle. The limit also holds for
+    damaged lines: a line with a checksum loses two characters, and the checksum does not detect it;
+    or a line without a checksum loses one character.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

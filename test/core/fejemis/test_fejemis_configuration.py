@@ -161,8 +161,8 @@ def test_a_small_change_by_the_user_is_written() -> None:
 def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
     """The user changes a radius by 0.3 mm, and the line that writes it is damaged on its way.
 
-    The board then reports the old radius with four decimals. The driver notices that this value is
-    not the rounded new radius, and writes the new radius again.
+    The board then reports the old radius, with four decimals. These are enough to show that it is
+    not the new radius, so the driver writes the new radius again.
     """
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))

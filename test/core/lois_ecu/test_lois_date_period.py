@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the period of the GPS date, and of requests for one date, which confirm the settings."""
+"""Tests of the period with which the board sends the GPS date, and of requests for one date.
+
+A request for one date confirms the board's settings, but it also ends the periodic dates.
+"""
 
 import pytest
 from lois_bench import FIRMWARE, Bench

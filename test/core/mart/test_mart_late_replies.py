@@ -173,10 +173,11 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """A copy of the IMU check's ``ok`` is taken for the reply to the start of a backward drive.
+    """The late reply to a start arrives after a stop. The driver does not take it for the stop's.
 
-    The first stop of this drive is lost. The true reply to the start comes after the stop. The
-    driver does not take it for the stop's reply.
+    The driver has taken a copy of the IMU check's ``ok`` for the reply to the start of a backward
+    drive. It stops this drive, but the first stop is lost. Then the true reply to the start
+    arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

@@ -266,9 +266,10 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 
 
 def test_a_server_without_these_commands_is_asked_once() -> None:
-    """A server that follows the manual does not support MCS (direct control of the motors).
+    """After a straight move, the driver sends MCS to switch off the motors.
 
-    The driver sends MCS only once, although the robot makes two straight moves.
+    A server that follows the manual does not support MCS. The driver sends it only after the first
+    of two moves.
     """
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):

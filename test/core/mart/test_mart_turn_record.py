@@ -241,9 +241,9 @@ def test_a_new_command_does_not_wait_for_the_record() -> None:
 
 
 def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
-    """The user cancels the goal during each download of a record.
+    """The user cancels each goal during the download of its record, so no record arrives.
 
-    This does not show that the server has no records, so the driver continues to request them.
+    This does not show that the server has no records. The driver continues to request them.
     """
     bench = MartBench("source").ready()
     for count in range(1, UNRECORDED + 3):
