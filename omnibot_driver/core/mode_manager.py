@@ -217,7 +217,7 @@ class ModeManager:
     def at_rest(self) -> bool:
         """Whether data from a running board has no effect here.
 
-        This is the case if no request is open and the board is not to be paused.
+        This is so in the phase SETTLED, if no request is open and the board is not to be paused.
         """
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 

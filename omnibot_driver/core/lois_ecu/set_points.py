@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop until RPM 0/0 is sent. During this time, the board still counts ticks, and
-the tick counts can show the standstill. After RPM 0/0, it does not count ticks any more."""
+"""Time in s from a Stop until RPM 0/0 is sent. During this time, the tick counts can show the
+standstill. After RPM 0/0, the public firmware does not count ticks any more."""
 CLEAR_AGAIN_S: Final = 0.15
 
 

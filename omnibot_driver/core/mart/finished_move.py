@@ -111,7 +111,7 @@ class Done:
         """Whether the encoder contradicts the server, which has reported a completed turn.
 
         The right wheel has then turned much less or much more than the turn requires. The server
-        ends a turn by the gyro alone, so it does not notice a wheel that is stuck or slips.
+        ends a turn by the gyro, so it may not notice a wheel that is stuck or slips.
         """
         if self.is_straight or not self.completed or not self.is_large:
             return False

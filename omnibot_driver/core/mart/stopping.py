@@ -45,8 +45,8 @@ SLOW_STOP: Final = (
 NO_START_S: Final = 0.75
 """Duration in s of a controlled turn (MCR, MCL) beyond which a wheel has certainly turned.
 
-If no wheel turns, the server gives up after 0.6 s. If a wheel turns, the turn lasts longer than
-0.75 s, because the server then waits 0.75 s for the robot to stop.
+If no wheel turns, the server gives up after 0.6 s. If the wheels turn too long after the end of the
+turn, the server gives up later, because it waits 0.75 s for the robot to stop.
 """
 
 

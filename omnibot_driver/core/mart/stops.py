@@ -33,7 +33,7 @@ BLIND_S, TRIPS = 0.8, 5
 It is BLIND_S (s), plus TRIPS times the average duration of an exchange.
 """
 FROZEN_S, FROZEN_TIMES = 0.5, 3
-"""Limits of a constant heading. When it exceeds both limits, the driver stops the robot.
+"""Limits of a constant heading. If both limits are reached, the driver stops the robot.
 
 The IMU may then be dead, or the robot stuck.
 

@@ -222,8 +222,9 @@ class Odometry:
         """Return whether a pose is the first one, or shows a new frame after a suspected restart.
 
         * The first pose must confirm the last doubted pose (``confirmed``).
-        * After a suspected restart, a pose that fits the motion since the restart shows a new frame
-          at once. Any other pose must confirm the last doubted pose.
+        * After a suspected restart, a pose shows a new frame at once if it fits the motion since
+          the restart, and fits it better than the old frame. Any other pose must confirm the last
+          doubted pose.
         * A pose that fits the old frame ends the suspicion, so the result is False. A pose in the
           old frame also does so if it is confirmed and the robot can have reached it.
         """

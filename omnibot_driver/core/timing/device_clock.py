@@ -91,7 +91,8 @@ class DeviceClock:
         If the next new tick is read within half a period, both ticks had waited to be read.
         """
         self._awaited: Point | None = None
-        """Number of the next tick, and the earliest time in s at which its sample is complete."""
+        """Number of the next tick, and the earliest time in s at which its sample can be
+        complete."""
         self._cut_off: Point | None = None
         """Number of the tick whose sample was incomplete in the last read, and a time in s.
 
