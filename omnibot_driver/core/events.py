@@ -28,7 +28,7 @@ class Notice:
 class Extra:
     """A measurement that only one kind of board makes; its profile publishes it.
 
-    If ``value`` is a RequestDone or Unstamped, it needs no stamp.
+    If ``value`` is a RequestDone or Unstamped, it is published without a stamp.
 
     * ``stamp_s``: time of measurement, in s of the host's steady clock.
     """

@@ -37,7 +37,7 @@ from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
 BESIDE: Final = (0, 2, 4)
-"""Numbers of busy processes. There is one measurement with each number."""
+"""How many other processes are busy in each of the measurements."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
@@ -136,10 +136,10 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Measure the delays; return an empty list, and the rows of a table.
+    """Measure the delays; return a list of figures, which is empty, and the rows of a table.
 
-    For other boards, such a list has comparisons of the driver with the floor, the smallest program
-    with the same output. There is no floor for the Fejemis, so its list is empty.
+    The benchmarks of other boards return figures that compare the driver with the floor, the
+    smallest program with the same output. The Fejemis has no floor, so it has no such figures.
     """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",

@@ -91,7 +91,10 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start ``steps.py`` with the step ``what``: a relay that has some of the driver's tasks."""
+    """Start ``steps.py``, a relay that has some of the driver's tasks.
+
+    ``what``: the step that determines which tasks.
+    """
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 

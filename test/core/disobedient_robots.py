@@ -60,8 +60,8 @@ def stopped_after_s(
 ) -> float:
     """Command the robot until the driver sends Stop.
 
-    Return the time in s from the robot's first deviation from the command to this Stop. A Stop
-    before the deviation is an error.
+    Return the time in s between two events: the robot first deviates from the command, and the
+    driver sends Stop. If Stop comes first, the call fails.
     """
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick

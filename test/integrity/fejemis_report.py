@@ -34,15 +34,15 @@ SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""For each fault, two limits on lines with checksums.
+"""For each fault, two limits, which apply to lines with checksums.
 
-They are the least share of the values that must be published, and N: at most one value in N may be
-wrong. N = 0 means that no value may be wrong.
+The first limit is the least share of the values that must be published. The second limit is N: at
+most one value in N may be wrong. N = 0 means that no value may be wrong.
 """
 ASTRAY_M: Final = 0.02
 
 Stream = list[dict[int, bytes]]
-"""For each read, the bytes from each channel. The keys are the numbers of the channels."""
+"""The bytes of all reads in order. The bytes of one read are stored by the channel's number."""
 
 
 @dataclass(slots=True)
@@ -150,10 +150,10 @@ def value_of(event: Event) -> str | None:
 
 
 def score(truth: list[Event], found: list[Event]) -> Score:
-    """Compare published values with the true ones.
+    """Compare the events of a session on damaged lines with those of one on undamaged lines.
 
-    A value may be published more often in ``found`` than in ``truth``. The additional publications
-    are regarded as wrong.
+    ``truth``: events on undamaged lines. ``found``: events on damaged lines. If ``found`` has a
+    value more often than ``truth``, the additional ones count as wrong.
     """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))

@@ -2,8 +2,8 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-A moving robot has the twist of the last motion that the driver wrote, even if the line damaged this
-command. The driver therefore cannot detect the damage by the readings.
+A moving robot always has the twist of the driver's last motion command, even if the line has
+damaged this command. So the readings do not show the damage to the driver.
 """
 
 import math
@@ -70,7 +70,10 @@ class Teller:
             )
 
     def step(self, shown: Shown) -> bytes:
-        """Advance by one tick in this state, and return the bytes that the board sends."""
+        """Advance by one tick, and return the bytes that the board sends.
+
+        ``shown``: the board's state in this tick.
+        """
         if shown.mode != self._mode:
             if self._mode == "booting":
                 self._reboot()

@@ -2,8 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board reports a moving robot while the driver drives, or while the board's own set-point is a
-motion. A change of the board's state appears in its reports after one or two ticks.
+The board reports a moving robot in two cases: while the driver sends motion commands, and while the
+set-point that the board has received is a motion. A change of the board's state appears in its
+reports after one or two ticks.
 """
 
 import math
@@ -36,7 +37,8 @@ Memo = dict[tuple[bytes, bool, bytes], Made]
 
 A key has the bytes that the receiver held before, whether the line was idle then, and the new
 bytes. A value has the bytes that the receiver holds afterwards, and the frames that it found, each
-with the position of its last byte. The value is ``None`` if the bytes contain a letter.
+with the position of its last byte. The value is ``None`` if the receiver has found a letter (S, P
+or R) in the bytes.
 """
 
 
@@ -135,7 +137,10 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip writes that arrive undamaged and change nothing, but not the last such write."""
+        """Count the next writes as arrived without playing them, as far as they change nothing.
+
+        These are writes that arrive undamaged. The last of them is not skipped.
+        """
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (
@@ -164,7 +169,7 @@ class Trial:
         self._number = last
 
     def _write(self) -> None:
-        """Send the next write over the line, and process what arrives."""
+        """Send the bytes of the driver's next write over the line, and process what arrives."""
         course, number = self._course, self._number
         write, items = course.writes[number], course.items[number]
         self._number += 1
@@ -296,9 +301,9 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """Record this error and the bytes that led to it.
+        """Add the error ``what`` and the bytes that led to it to the score's examples.
 
-        A score keeps only the first few errors.
+        The score keeps only the first few examples.
         """
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:

@@ -97,8 +97,8 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 def test_what_the_driver_tells_is_explained() -> None:
     """The troubleshooting guide has a row for each message of the driver.
 
-    A row fits if it contains the beginning of the message. It also fits if the message contains all
-    parts of the message that the row quotes.
+    A row belongs to a message if it contains the beginning of the message. It also does if the
+    message contains all parts that the row quotes.
     """
 
     def is_explained(template: str) -> bool:

@@ -11,9 +11,10 @@ BATCH: Final = 5
 
 
 class InBatches(RunningBoard[B]):
-    """Runs ``BATCH`` ticks at once. If a packet arrives earlier, only the ticks that are due run.
+    """A running board that waits for ``BATCH`` ticks, and then runs them at once.
 
-    What the board sends in these ticks arrives together, as through a USB adapter.
+    If a packet arrives during the wait, the board runs only the ticks that are due. What it sends
+    in these ticks arrives together, as through a USB adapter.
     """
 
     def _due(self, due_s: float) -> tuple[int, float]:

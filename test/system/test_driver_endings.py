@@ -45,10 +45,10 @@ import omnibot_driver.driver as driver, omnibot_driver.link as link
 link.STANDS_WITHIN_S = link.SILENCE_S = link.BOTH_PROOFS_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
-"""Code that sets longer time limits for the driver's end.
+"""Code that makes the driver wait longer at its end, before it gives up.
 
-On a busy computer, the board's report of a standstill comes late. The driver waits no longer than
-necessary, so the limits do not delay a test.
+This is necessary because on a busy computer, the board's report of a standstill comes late. The
+limits do not delay a test, because the driver waits only until the report arrives.
 """
 
 
@@ -95,7 +95,7 @@ atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in e
 """
 """Code that makes the driver print, at its exit, how many executors still run.
 
-The code also makes the driver wait longer for its threads.
+The code also gives the driver's threads more time to end.
 """
 
 
@@ -137,7 +137,7 @@ threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20
 """Code that blocks the executor's thread in a callback.
 
 The callback returns when the driver has asked the executor to end.
-The code also makes the driver wait longer for its threads.
+The code also gives the driver's threads more time to end.
 """
 
 
@@ -146,8 +146,8 @@ def test_a_pending_service_answers_although_the_executor_learns_of_its_result_la
 ) -> None:
     """A user calls ``~/reset``. The driver ends before the board has finished the reset.
 
-    At this time, a callback blocks the executor. The call is still answered: the answer says that
-    the driver is shutting down.
+    A callback blocks the executor while the driver ends. Nevertheless, the user gets an answer: the
+    driver is shutting down.
     """
     board = start_board(boot_time_s=1000.0, running=True)
     driver: Driver = start_driver(board.path, before=HOLDS_THE_EXECUTOR)

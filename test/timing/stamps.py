@@ -84,7 +84,10 @@ def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[F
 
 
 def publish(name: str, lines: list[str]) -> None:
-    """Print the lines, and write them into the document between the marks with this name."""
+    """Print the lines, and write them into the document.
+
+    There, they replace the text between the two marks that contain ``name``.
+    """
     text = "\n".join(lines)
     print(text)
     begin, end = (mark.format(name) for mark in MARKS)

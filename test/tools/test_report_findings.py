@@ -96,9 +96,9 @@ def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """Timestamps jump ahead by 20 ms and slowly return. The report calls this a jump, not a gap.
+    """Timestamps jump ahead by 20 ms, and then slowly become right again.
 
-    The cause is a driver that could not read for some time.
+    This happens if the driver could not read for some time. The report calls it a jump, not a gap.
     """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
@@ -142,7 +142,10 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_gap_at_the_end_begins_at_a_timestamp_too(drive: Drive) -> None:
-    """The recorder's clock is 3 s behind the robot's. The report places gaps by timestamps."""
+    """The recorder's clock is 3 s behind the robot's clock, and a topic ends early.
+
+    The report gives the beginning of this gap by the messages' timestamps, not by their arrival.
+    """
     drive.imu.drop(17.0, 99.0)
     drive.imu.late_s = drive.imu.late_s - 3.0
     assert "from 17.0 s on" in said(drive, "Gaps", "imu/data_raw").text

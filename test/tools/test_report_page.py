@@ -69,7 +69,7 @@ def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
 def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
     """All values are NaN, so some pictures cannot be drawn.
 
-    A picture of an earlier report is removed.
+    If an earlier report has left a file of such a picture, the file is removed.
     """
     drive = Drive(10.0)
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):

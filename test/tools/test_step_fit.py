@@ -180,7 +180,10 @@ def test_lost_deltas_are_left_out() -> None:
 
 
 def test_odometry_that_was_lost_is_said() -> None:
-    """The odometry ends after five deltas, so no step is complete. This is an error."""
+    """The odometry ends after five deltas, so no step is complete.
+
+    ``steps_of`` raises ToolError.
+    """
     commands, wheels = steps_to_and_fro(MotorConstants(), steps=2)
     silent = replace(
         wheels,

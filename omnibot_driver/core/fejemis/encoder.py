@@ -84,8 +84,8 @@ class Encoder:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
         True while the angle limits the speed, because the limit changes with the angle. Also true
-        without checksums: the board may obey a damaged line, which the next angle's lines replace
-        after 15 ms.
+        without checksums, because a board may then obey a damaged line. The next angle comes after
+        15 ms, and the lines that follow it replace the damaged line.
         """
         return self.held or not self._pair.with_sums
 
@@ -109,10 +109,11 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist that ``packets`` give the body at the wheel angle that ``encode`` used.
+        """Return the twist of the robot's body that ``packets`` command.
 
-        The caller passes packets that were sent. If they are not the last result of ``encode``, or
-        are passed a second time, they are regarded as a stop.
+        The caller passes packets that were sent. If they are the last result of ``encode``, the
+        twist is the one at the front wheel's angle that ``encode`` used. Other packets, and packets
+        that are passed a second time, are regarded as a stop.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -25,16 +25,19 @@ from omnibot_driver.core.fejemis.readings import Job, JobDone
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
 """The reason for refusing motion, brush and lift after a requested power-off."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
-"""Pairs of digits whose codes add up to 99: a checksum does not detect the loss of both."""
+"""Pairs of digits whose ASCII codes add up to 99.
+
+If a line loses both digits of a pair, its checksum still fits.
+"""
 CALIBRATED_WITHIN_S: Final = 8.0
 ANSWERED_WITHIN_S: Final = 4.5
-"""``CALIBRATED_WITHIN_S``: time in s from the request, after which a calibration ends as failed.
-``ANSWERED_WITHIN_S``: the same for any other job."""
+"""``CALIBRATED_WITHIN_S``: longest duration of a calibration in s, from the user's request.
+``ANSWERED_WITHIN_S``: longest duration of any other job. After this time, the job has failed."""
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How many times the line of a job is sent, except for a calibration."""
+"""How many times the driver sends the command of a job. Calibrations have their own limit."""
 UNCHANGED_S: Final = 2.4
 """Time in s since a command to calibrate. If the offsets are still unchanged after this time, the
 command was probably lost."""
@@ -273,11 +276,12 @@ class Jobs:
 
 
 def _answers(role: Role, message: Message) -> bool:
-    """Return whether ``message`` answers the request that the driver sends after ``eer``.
+    """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    ``eer`` is the command to load the configuration. The board does not answer it, but an answer to
-    the request after it shows that the board receives lines. A front board that does not know the
-    request answers with a comment.
+    ``eer`` is the command to load the configuration. The board does not answer it. So the driver
+    then sends a query: ``confi`` to the drive board, ``fwoi`` to the front board. An answer shows
+    that the board receives lines. A front board that does not know ``fwoi`` answers that it is
+    unhandled.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

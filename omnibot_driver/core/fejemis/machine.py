@@ -28,10 +28,10 @@ once.
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Smallest ratio of the lift voltage that the driver sends to the voltage that the user commands.
+"""Lower limit of the voltage that the driver sends to the lift, as a fraction of the commanded one.
 
-The driver sends a lower voltage than commanded if the checksum could not detect damage to the line
-with the commanded voltage.
+The driver sends a lower voltage than the user commands if the checksum could not detect damage to
+the line with the commanded voltage.
 """
 LEAST_TIME_S: Final = 0.04
 

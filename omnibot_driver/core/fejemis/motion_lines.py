@@ -18,8 +18,8 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Smallest commanded speed in a curve, in m/s, that is written to the front board. In place of a
-smaller speed, 0 is written, because only few smaller numbers can be sent safely."""
+"""Lower limit of the speed in the front board's line, in m/s, for a curve. If the commanded speed
+is lower, the line has the speed 0. Most numbers below the limit cannot be sent safely."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""
@@ -27,10 +27,10 @@ ANGLE_COST: Final = 1e4
 """Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle. For
 comparison: a speed that is wrong by a factor of 2.7 (e) costs 1."""
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to the linear speed in the drive board's line.
+"""Limit of the linear speed in the drive board's line.
 
-For forward motion, the linear speed can also be 0. For backward motion it cannot, because its sign
-gives the direction.
+The linear speed is at least the outer wheel's speed divided by this number. In forward motion, it
+can also be 0. In backward motion, it is never 0, because its sign gives the direction.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
@@ -95,9 +95,9 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the cheapest line whose checksum would reveal damage on the way to the board.
+    """Return the line with the lowest cost whose checksum would reveal damage to the line.
 
-    If no line has such a checksum, return the cheapest of all lines.
+    If no line has such a checksum, return the one with the lowest cost of all.
 
     ``signs``: the signs of speed and turn rate, as text.
     """

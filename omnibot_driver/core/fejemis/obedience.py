@@ -11,7 +11,10 @@ import math
 from typing import Final
 
 STOPPED: Final = -1.0
-"""Value of rcSource while the drive board ignores all motion commands (manual, start)."""
+"""Value of rcSource while the drive board ignores all motion commands.
+
+Source: the manual's text on the command ``start``.
+"""
 RELEASED_S: Final = 1.0
 """Time in s after the release of an e-stop during which ``start`` is repeated."""
 START_AGAIN_S: Final = 0.2
@@ -51,7 +54,10 @@ class Obedience:
             self.start_at = math.inf
 
     def latch(self, *, running: bool) -> None:
-        """Latch the driver's e-stop; ``running``: whether the board has obeyed until now."""
+        """Latch the driver's e-stop.
+
+        ``running``: whether the drive board obeys motion commands at this moment.
+        """
         if not self.estopped:
             self._resume = running
         self.estopped = True

@@ -12,10 +12,10 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of lines that the diagnostics show as unknown to the firmware.
+"""Largest number of unknown lines in the diagnostics.
 
-The driver has sent these lines, and the firmware has answered that it does not know them. The
-diagnostics show the latest ones.
+An unknown line is a line from the driver to which the firmware has answered that it does not know
+it. The diagnostics show the latest unknown lines.
 """
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 

@@ -19,10 +19,14 @@ NO_ANGLE_S: Final = 0.25
 """Time in s without an angle of the front wheel, after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
-"""Silence in s after which the user is notified that the board at an opened port is missing."""
+"""Time in s from the opening of the ports. If one board is still silent after this time, and the
+other one sends, the driver notifies the user that the first one is missing."""
 UNREAD_S: Final = 0.03
-"""Time in s without a line of either board, after which missing data is not blamed on one board.
-Each board sends at least every 15 ms. So the driver has read late, or both boards are cut off."""
+"""Longest time in s for which the driver normally reads no line of either board.
+
+Each board sends at least every 15 ms. After a longer time, the driver has read late, or both boards
+are cut off. So the driver does not blame one board for the missing data.
+"""
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
     " or check the USB hub"
@@ -61,9 +65,10 @@ class Watch:
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Check all timeouts, and add notices of the new ones.
+        """Check all timeouts, and add a notice about each that has expired.
 
-        Return whether this call finds the loss of a data stream that driving requires.
+        Driving requires one data stream from each board. Return whether this call finds that such a
+        stream has stopped.
         """
         self._look_at_reads(now)
         if self._stalled:
@@ -126,8 +131,8 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, missing data is not blamed on one board for the next ``OLDEST_S``. In this time, the
-        driver reads the lines that have arrived but were not read yet.
+        If so, the driver does not blame one board for missing data during the next ``OLDEST_S``:
+        the data may have arrived already, and the driver reads it in this time.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

@@ -59,7 +59,7 @@ class Estimates:
     def conclude(self, at_s: float, may_roll_mps: tuple[float, float]) -> FusedOdometry:
         """Return the estimate at ``at_s``, the time of the filter's state.
 
-        The displacement of the next estimate begins at this estimate.
+        Also store its pose: the next estimate's displacement is measured from this pose.
 
         ``may_roll_mps``: see ``now``.
         """
@@ -90,7 +90,7 @@ class Estimates:
     ) -> FusedOdometry:
         """Return the estimate at ``stamp_s``. This call has no effect on the next estimate.
 
-        ``unheard_s``: how much later than the filter's state ``stamp_s`` is, in s.
+        ``unheard_s``: time in s from the filter's state to ``stamp_s``.
 
         ``may_roll_mps``: greatest possible speed of each wheel during ``unheard_s``, in m/s.
         """

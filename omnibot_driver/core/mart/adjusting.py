@@ -32,7 +32,7 @@ STARTED_M: Final = 0.01
 
 
 class Adjusting(Moves):
-    """The part of the pilot that adjusts the current motion to the command."""
+    """The part of ``Pilot`` that adjusts the current motion to the user's command."""
 
     @property
     def motor_balance(self) -> str:
@@ -74,8 +74,9 @@ class Adjusting(Moves):
     def _predict_turn(self) -> None:
         """Pass the expected ratio of wheel speeds (left / right) to the odometry.
 
-        The odometry computes the turn from this ratio in turns on the spot, and in backward drives
-        (B) while the server does not report the heading. In all other motions, the ratio is None.
+        The ratio is needed in two cases: in a turn on the spot, and in a backward drive (B) whose
+        heading the server does not report. The odometry then computes the turn from the ratio. In
+        all other cases, the ratio is None.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:

@@ -42,16 +42,19 @@ WRONG_WAY: Final = (
 )
 DISCARDED: Final = "; the goal of cmd_pose is discarded: remove the cause, then send the goal again"
 OFF_COURSE_RAD: Final = 0.5
-"""Standard deviation in rad of the turn in a move that fails because one wheel does not turn.
+"""Assumed standard deviation, in rad, of the robot's turn in a failed move.
 
-The server does not report this turn.
+If one wheel does not turn, the move fails and the robot turns. The server reports only the failure.
 """
 LEAST_STOP_S: Final = 0.3
-"""Shortest time in s from a stop of a controlled move (SL or SS) until the server answers again."""
+"""Shortest time in s that the server needs to stop a controlled move after SL or SS.
+
+Only then does the server answer again.
+"""
 
 
 class Moves(Asking):
-    """The part of the pilot that drives to a goal."""
+    """The part of ``Pilot`` that drives to a goal."""
 
     @property
     def goal_progress(self) -> str:
@@ -121,10 +124,10 @@ class Moves(Asking):
                 self.odometry.doubt_turn(OFF_COURSE_RAD)
 
     def _learn_from(self, move: Request, now: float) -> None:
-        """Learn from a finished move by how much such moves exceed the requested distance or turn.
+        """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn on a good network, the driver downloads the server's record of the turn, and
-        learns later from this record. The record is more exact than the wheel's measurement.
+        After a turn on a good network, the driver first downloads the server's record of the turn.
+        It learns from this record instead, which is more exact than the wheel's measurement.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -159,7 +162,7 @@ class Moves(Asking):
         self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
 
     def _end_move(self, now: float) -> None:
-        """End a motion after its last count, and evaluate it if it was a controlled move."""
+        """End a motion after its last encoder count. If it was a controlled move, evaluate it."""
         move, self._last_move = self._last_move, None
         completed, self._moved_by = self._moved_by is not None, None
         if move is None:
@@ -210,8 +213,8 @@ class Moves(Asking):
         """Return whether the driver may have stopped a second run of a controlled move.
 
         The result is False if the driver has sent no stop after the move. It is also False if the
-        move was complete and the server answered again very soon. In such a short time, a stop
-        cannot end a second run, and a second run cannot end by itself.
+        move was complete and the server answered again very soon. A second run keeps the server
+        from answering for longer, whether a stop ends it or it ends by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
@@ -226,7 +229,7 @@ class Moves(Asking):
         self._notice(CONTRADICTED.format(asked_deg, seen_deg) + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
-        """Discard the goal, because the network may have duplicated the last move to it."""
+        """Discard the goal, because the network may have duplicated its last move request."""
         if self._move is None or self._move.given_up:
             return
         self._move.fail()

@@ -17,14 +17,14 @@ from omnibot_driver.core.readings import OdometryReading
 
 LONGEST_PREDICTION_S: Final = 0.5
 SLOWING_S: Final = 0.12
-"""Time constant in s with which a robot that is being stopped slows down."""
+"""Time constant in s of the exponential decay of the robot's speed after a stop."""
 ACCELERATION_MPS2: Final = 1.0
 """Standard deviation of the acceleration since the last count, in m/s²."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
 """Standard deviations of the errors of measured speeds, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
-"""Standard deviations of speed and turn rate, in m/s and rad/s, after a start, until both are
-measured."""
+"""Standard deviations of the speed and turn rate of a robot that has started, in m/s and rad/s.
+They apply until speed and turn rate are measured."""
 BLIND_RADPS: Final = 1.5
 """Standard deviation of the turn rate of a robot during a controlled move, in rad/s."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03
@@ -63,9 +63,9 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the possible errors of the motion since the last encoder count.
+        """Return the possible errors of the motion that is predicted since the last encoder count.
 
-        The time of this count is uncertain. The errors that result from this are included.
+        They include the errors that result from the uncertain time of this count.
 
         ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the current
         controlled move, or None.

@@ -66,12 +66,13 @@ class SwitchOff:
     def next(self) -> Request:
         """Return the next request: OFF if a motor may be on, else RELEASE.
 
-        OFF is the command MCS, which writes "stop" to both motors. RELEASE (MSM) ends its effect.
+        OFF is the command MCS, which writes "stop" to both motors and makes the server refuse
+        motions. RELEASE is MSM, after which the server accepts motions again.
         """
         return OFF if self.needed else RELEASE
 
     def sent(self) -> None:
-        """Record that the next request was sent."""
+        """Record that the request returned by ``next`` was sent."""
         self.underway = True
 
     def answered(self, word: Word, reply: Ok | Fail) -> None:
@@ -88,9 +89,10 @@ class SwitchOff:
         """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
 
         After MOST_MISSES unanswered requests in a row, the driver allows motions again. If the last
-        of these requests was MCS, the driver sends no MCS until the next connection. If MCS is
-        still in progress, the server refuses the next motion. The driver then sends MSM, which ends
-        MCS.
+        of these requests was MCS, the driver also stops using MCS until the next connection.
+
+        The server may still execute an earlier MCS, and then refuses the next motion. In this case,
+        the driver sends MSM, which ends the direct control by MCS.
         """
         self._misses += 1
         if self._misses < MOST_MISSES:

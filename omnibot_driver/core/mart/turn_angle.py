@@ -39,21 +39,24 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def add(self, turn_rad: float) -> float:
-        """Add a turn measured at the wheel; return the angle by which the pose must be turned.
+        """Add a turn measured at the wheel; return the angle that the caller adds to the heading.
 
-        This angle is zero if the server has already reported the angle of the whole turn, because
-        the pose then contains the reported angle.
+        The result is zero if the server has already reported the angle of the whole turn: the
+        heading then contains the reported angle.
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0
 
     def tell(self, told_rad: float) -> float:
-        """Process the angle in the reply to the stop; return the correction of the heading."""
+        """Process the turn's angle from the server's reply to the stop request.
+
+        Return the correction of the heading.
+        """
         self.told_rad = told_rad
         return told_rad - self.spun_rad
 
     def end(self, *, may_be_recorded: bool) -> float:
-        """End the turn after its last count; return the correction of the heading.
+        """End the turn after its last encoder count; return the correction of the heading.
 
         If the server has reported an implausible angle, the wheel's measurement replaces it.
 

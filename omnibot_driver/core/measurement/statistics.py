@@ -23,10 +23,10 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by this
-      period, is the number of IMU readings that the board has sent in this time. If fewer IMU
-      readings have arrived, the missing ones are counted as lost. The period is None if the board's
-      IMU readings themselves say how many readings were lost (``lost``).
+    * ``imu_period_s``: period of the IMU in s. From it and the duration of a displacement, the
+      number of IMU readings is computed that the board has sent in this time. If fewer have
+      arrived, the others are counted as lost. The period is None if the IMU readings themselves
+      say how many were lost (``lost``).
     """
 
     imu_period_s: float | None = None
@@ -58,7 +58,7 @@ class StreamStatistics:
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
-        """Count the readings of one read, and the age of its newest sample."""
+        """Count the readings of one read. Add ``delay_s``, the age of its newest sample in s."""
         if isinstance(readings[-1], (ImuReading, DisplacementReading)):
             self.reads += 1
             self.delay_s += delay_s

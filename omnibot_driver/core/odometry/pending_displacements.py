@@ -13,7 +13,10 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 class PendingDisplacements:
-    """The waiting displacements in order of arrival, each with its stamp in s."""
+    """Displacements that wait for a pose of the board, in order of arrival.
+
+    Each has its stamp in s.
+    """
 
     def __init__(self) -> None:
         self._waiting: list[tuple[DisplacementReading, float]] = []
@@ -26,7 +29,7 @@ class PendingDisplacements:
         self._waiting.append((reading, stamp_s))
 
     def take(self) -> list[tuple[DisplacementReading, float]]:
-        """Return all displacements and keep none."""
+        """Return all displacements that wait, and remove them from this object."""
         waiting, self._waiting = self._waiting, []
         return waiting
 
@@ -38,12 +41,12 @@ class PendingDisplacements:
 
     @property
     def lost(self) -> int:
-        """Number of displacements that were lost just before the first waiting one."""
+        """Number of displacements that were lost before the first displacement kept here."""
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property
     def lost_s(self) -> float:
-        """Duration in s of the displacements that were lost before the first waiting one."""
+        """Duration in s of the displacements that ``lost`` counts."""
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property
@@ -52,9 +55,10 @@ class PendingDisplacements:
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Return the time in s without a report before the first waiting displacement.
+        """Return the time in s without a report before the first displacement that is kept here.
 
-        ``last_stamp_s``: stamp before the gap, which is used if the displacement has no duration.
+        ``last_stamp_s``: stamp of the last report before this time. It is used only if the
+        displacement has no duration.
         """
         if not self._waiting:
             return 0.0
@@ -77,7 +81,10 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """Return the pose before the waiting displacements, given the pose ``board`` after them."""
+        """Return the pose before all displacements kept here.
+
+        ``board``: the pose after them.
+        """
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)
         )
@@ -93,7 +100,10 @@ def chord(reading: DisplacementReading) -> Pose:
 
 
 def advanced(board: Pose, reading: DisplacementReading) -> Pose:
-    """Return the pose ``board``, in the board's frame, after a displacement."""
+    """Return the pose that the robot reaches from the pose ``board`` by a displacement.
+
+    Both poses are in the board's frame.
+    """
     if reading.frame == "earth":
         return Pose(
             board.x_m + reading.dx_m, board.y_m + reading.dy_m, board.yaw_rad + reading.dyaw_rad

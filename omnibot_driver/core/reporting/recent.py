@@ -10,11 +10,11 @@ from omnibot_driver.core.board import RateName
 from omnibot_driver.core.reporting.figures import LinkFigures, SessionFigures
 
 RECENT_S: Final = 10.0
-"""Time in s for which figures are kept, and for which the diagnosis shows an event."""
+"""Time in s for which figures are kept. An event also affects the diagnosis for this time."""
 
 
 class RecentFigures:
-    """The figures of the last 10 s, but only those since the session's state last changed."""
+    """The session's figures of the last 10 s, or since the last change of the session's state."""
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
@@ -22,7 +22,7 @@ class RecentFigures:
         self._waits: deque[tuple[float, float]] = deque()
 
     def remember(self, session: SessionFigures, now: float) -> None:
-        """Add the figures; forget older figures if the session's state has changed."""
+        """Add the session's figures; forget all earlier ones if the session's state has changed."""
         if self._window and self._window[-1][1].state != session.state:
             self._window.clear()
         self._window.append((now, session))

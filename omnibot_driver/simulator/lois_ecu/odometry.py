@@ -51,10 +51,11 @@ class DocumentedOdometry:
 
 
 class FirmwareOdometry(DocumentedOdometry):
-    """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
+    """Odometry as the firmware computes it: at each encoder tick, from the latest RPMs.
 
     ``stands``: whether the position does not change while both RPMs are equal.
-    ``divides``: whether to divide even by a time of zero. The velocity is then NaN or infinite.
+    ``divides``: whether the velocity is NaN or infinite after two ticks at the same time, because
+    the firmware divides by zero.
     ``slow``: whether each count of the timer takes 0.7 % too long.
     """
 

@@ -51,7 +51,10 @@ def number_of(bits: int) -> float:
 
 
 def sequence(command: int, payloads: list[int]) -> bytes:
-    """Encode a line whose payload is 0xFFFFFFFF, and then one line for each payload."""
+    """Encode a marker line (payload 0xFFFFFFFF), and then one line for each of ``payloads``.
+
+    All lines have the same ``command``.
+    """
     return b"".join(line(command, payload) for payload in (0xFFFFFFFF, *payloads))
 
 

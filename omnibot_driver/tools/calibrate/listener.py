@@ -32,7 +32,8 @@ LOST_S: Final = 0.3
 CLOCKS_S: Final = 0.1
 """Largest accepted difference between the driver's clock and this computer's clock, in s.
 
-The tool compares the times of its commands with the timestamps in the odometry.
+The tool takes the times of its commands from this computer's clock, and compares them with the
+odometry's timestamps from the driver's clock.
 """
 AT_ONCE: Final = 100
 """Largest number of pending messages that are read at once."""

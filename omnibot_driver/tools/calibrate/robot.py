@@ -56,10 +56,10 @@ class Robot(Listener):
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """Number of commands that this node has published but not yet received back.
+        """For each topic and command: how many of this node's messages have not come back yet.
 
-        The key is a topic with the command's values. A negative number shows that another node
-        has published such a command.
+        This node subscribes to its own topics. A negative number shows that another node has
+        published this command.
         """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {

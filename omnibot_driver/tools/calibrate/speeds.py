@@ -87,7 +87,7 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Return a speed for every command in the log that was sent for long enough.
+    """Return the measured speed for each command in the log that lasted long enough.
 
     ``scales``: counts per m/s or rad/s, for x, y and yaw.
 

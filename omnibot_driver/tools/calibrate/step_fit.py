@@ -27,7 +27,7 @@ from omnibot_driver.tools.needs import ToolError
 ON_THE_WAY_S: Final = 0.0015
 """Time, in s, from the publication of a command to its last bit on the line.
 
-It is the time of DDS, plus the time of 9 bytes at 115200 baud.
+It is the time that DDS needs to deliver the command, plus the time of 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
 """Number of odometry deltas before the onset that belong to the record of a step."""
@@ -71,10 +71,10 @@ class Step:
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
-        """Return the predicted rate in each odometry delta of this step, in rad/s.
+        """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: the model. Its argument is the end of each delta, in ticks after a unit step. It
-        returns the mean rate in each delta.
+        ``mean``: the model's response to a unit step. Its argument is the end of each delta, in
+        ticks after the unit step. It returns the mean rate in each delta.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -246,9 +246,10 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps with their onsets moved to the ticks that fit the model best.
+    """Return the steps with corrected onsets: with these, the steps fit the model best.
 
-    If a busy computer delayed a command, the true onset is later than the computed onset.
+    An onset is computed from the time of a command. If a busy computer delayed the command, the
+    true onset is later.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

@@ -24,7 +24,7 @@ ANGULAR_BRAKING: Final = 0.4
 
 
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
-    """Return a law that drives the robot through these poses, and stops it at each pose.
+    """Return a control law that drives the robot through these poses, and stops it at each pose.
 
     ``places``: the poses relative to the start, with unwrapped yaw.
 
@@ -42,7 +42,7 @@ def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
 
 
 def straight(way_m: float, speed: float) -> Law:
-    """Return a law that drives a base with two wheels straight ahead.
+    """Return a control law that drives a base with two wheels straight ahead.
 
     ``way_m``: distance in m. ``speed``: largest speed in m/s.
     """
@@ -57,7 +57,7 @@ def straight(way_m: float, speed: float) -> Law:
 
 
 def turn(angle_rad: float, turning: float) -> Law:
-    """Return a law that turns the robot on the spot, at up to ``turning`` rad/s.
+    """Return a control law that turns the robot on the spot, at up to ``turning`` rad/s.
 
     The turn is to the left if ``angle_rad`` is positive.
     """

@@ -12,15 +12,15 @@ from omnibot_driver.tools.report.log import Log, Span, Status
 
 LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
 FIRST_SECONDS: Final = 3.0
-"""For this time in s from the beginning of a log, the driver may still be connecting."""
+"""Length in s of the beginning of a log, in which the driver may still be connecting."""
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s from the beginning of the last state in the log. A driver that still runs reports this
-state in /diagnostics even later.
+"""Time in s after which a state must appear in /diagnostics, if the driver still runs.
 
-If the last state is "disconnected", and /diagnostics does not show it after this time, the driver
-has ended.
+The time is counted from the beginning of the state. "disconnected" is the last state of a driver
+that has ended, or of one that has lost its board. Only the latter still reports it in /diagnostics
+after this time.
 """
 
 
@@ -80,9 +80,9 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Return whether /diagnostics shows this state more than 2 s (``SILENT_S``) after it began.
+    """Return whether the driver still ran in ``state``, the last state in the log.
 
-    If the result is False, the driver had ended.
+    It still ran if /diagnostics shows the state more than 2 s (``SILENT_S``) after it began.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

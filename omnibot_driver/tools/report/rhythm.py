@@ -22,14 +22,16 @@ LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Largest standard deviation, in periods, of steps between timestamps that are regarded as even."""
+"""Limit of the standard deviation of the steps between timestamps, in periods. Above this limit,
+the timestamps are reported as uneven."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Longest time in s after a long step between timestamps in which short steps can compensate it.
+"""Time limit in s, counted from a long step between timestamps.
 
-If the short steps come later, messages are regarded as missing.
+If short steps compensate the long step within this time, the timestamps have jumped. If not,
+messages are regarded as missing.
 """
 
 

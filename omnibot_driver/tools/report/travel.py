@@ -15,9 +15,10 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: the change of the pose between two messages is compared with the motion
-that the twist shows. If they differ by more than one of these limits, in m and rad, the change is a
-leap. The driver's own corrections of odom are smaller, because fastest_linear_speed limits them."""
+"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad of the difference between two motions: the change
+of the pose from one message to the next, and the motion that the twist shows. A change that exceeds
+a limit is a leap. The driver's own corrections of odom do not exceed them, because
+fastest_linear_speed limits these corrections."""
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
@@ -35,7 +36,8 @@ class Steps:
     """The steps from each message of odom to the next.
 
     ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
-    ``off_m``, ``off_rad``: difference between the pose's step and the motion by the twist.
+    ``off_m``, ``off_rad``: difference between the change of the pose and the motion that the twist
+    shows.
     ``leap``: whether this difference is too large. In a gap, only a step to the zero pose can be a
     leap.
     ``reset``: whether the step is a leap to the zero pose.

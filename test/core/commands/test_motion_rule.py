@@ -103,9 +103,9 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """The user requests a pause or a reset while the robot drives. The board does not receive it.
+    """After a request for a pause or a reset, the driver sends no motion frame.
 
-    The robot drives on. From the request on, the driver sends no motion frame.
+    This is so even if the board does not receive the request, and the robot drives on.
     """
     bench.drive(0.4)
     start = len(bench.written)
@@ -174,7 +174,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(ben
 
 
 def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
-    """The board is silent but may still receive. The driver sends a zero command to it as Stop."""
+    """The board is silent but may still receive. The driver sends a user's zero command as Stop."""
     bench.speaks = False
     bench.run(1.45)
     start = len(bench.written)

@@ -192,9 +192,9 @@ def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
 
 
 def said_by_the_driver() -> set[str]:
-    """Return all lines that the driver sends in a session in which everything is requested.
+    """Return all lines that the driver sends in a session in which a user requests everything.
 
-    The result also contains one relayed angle and one lift voltage, as examples.
+    The session relays no angle and moves no lift, so one line for each is added to the result.
     """
     written: dict[Written, tuple[float, ...]] = {
         Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
@@ -228,9 +228,10 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """Everything is requested from the driver once. It sends each command as in the table.
+    """A user requests everything that the driver offers.
 
-    It never sends the commands that the table marks as unused, such as ``setid``, which can erase
+    The driver then sends each command exactly as in the table's example line. It never sends the
+    commands that the table marks as unused or replaced. An unused one is ``setid``, which can erase
     the board.
     """
     said = said_by_the_driver()

@@ -219,7 +219,10 @@ def test_a_power_off_without_an_answer_may_still_come() -> None:
 
 
 def test_a_power_off_that_no_board_confirms_does_not_claim_to_happen() -> None:
-    """The drive board sends heartbeats but receives nothing. The answer says "does not confirm"."""
+    """The drive board receives no power-off command, but sends heartbeats.
+
+    The driver's answer to the user contains "does not confirm".
+    """
     bench = nominal()
     bench.hears.clear()
     assert "does not confirm" in ask(bench, Job.POWER_OFF, 5.0).message

@@ -122,7 +122,7 @@ def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() ->
 @pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.SAVE, Job.LOAD, Job.POWER_OFF])
 def test_boards_that_fall_silent_do_not_delay_an_answer(job: Job) -> None:
-    """Both boards fall silent after the request. The request fails within 5 s."""
+    """The user requests a job, and both boards fall silent. The job fails within 5 s."""
     bench = nominal()
     bench.run(1.5)
     bench.speaks.clear()
@@ -243,7 +243,10 @@ def test_a_refusal_during_a_job_names_the_job_without_an_article(job: Job, name:
 @pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
-    """During a calibration or a loading, motion is refused, because the robot must be at rest."""
+    """During a calibration, or while the boards load their configuration, motion is refused.
+
+    The robot must be at rest during these jobs.
+    """
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -276,9 +279,9 @@ def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: s
 
 @pytest.mark.slow
 def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None:
-    """An e-stop ends a loading, but the boards may already have loaded their saved values.
+    """An e-stop interrupts a request to load the saved configuration.
 
-    The driver writes the user's settings again.
+    The boards may already have loaded it, so the driver writes the user's settings again.
     """
     bench = nominal(settings=FejemisSettings(written={Written.FRONT_WHEEL: (2.5, 0.0)}))
     bench.run(2.0)
@@ -311,9 +314,10 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """The user requests a loading while the robot drives. The driver first sends a stop.
+    """The user requests to load the configuration while the robot drives.
 
-    It sends ``eer``, the command to load, only after the robot had time to stop.
+    The driver first stops the robot. It sends ``eer``, the command to load, only after the robot
+    has had time to stop.
     """
     bench = nominal()
     bench.drive_on()
@@ -328,11 +332,11 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
-    """The driver shuts down while the robot brakes before the loading of a configuration.
+    """The user requests to load the configuration. The driver shuts down while the robot brakes.
 
-    The request to load fails, and its answer names the shutdown as the reason. A changed setting
-    still waits to be written. The driver does not write it. It only sends commands to stop, and the
-    angles of the front wheel.
+    The request fails, and the answer names the shutdown as the reason. Before, the user had changed
+    a setting, which is not written to the boards yet. The driver does not write it during the
+    shutdown. It only sends commands to stop, and the angles of the front wheel.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

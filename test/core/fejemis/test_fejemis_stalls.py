@@ -18,7 +18,10 @@ def true_pose(bench: Bench) -> Pose:
 
 
 def unread(bench: Bench, seconds: float, *, room: int) -> dict[int, bytes]:
-    """Let time pass without a read. Return the first ``room`` bytes that each board sent."""
+    """Let time pass in which the driver reads nothing. Return what waits for it, by channel.
+
+    Of each board's bytes, only the first ``room`` are kept. Later bytes are lost.
+    """
     held = {DRIVE: b"", FRONT: b""}
     for _ in range(round(seconds / bench.robot.tick_s)):
         bench.now += bench.robot.tick_s
@@ -55,9 +58,9 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The robot drives a curve while the driver stalls. The odometry has all of this motion.
 
-    No line is lost. If the driver does not notice the stall, it rejects lines that are more than
-    1 s late. Then the first displacement covers seconds, and the next one covers 20 ms. The driver
-    regards neither displacement as implausible.
+    No line of the boards is lost. If the driver does not notice the stall, it rejects lines that
+    are more than 1 s late. In this case, the first displacement after the stall covers seconds, and
+    the next one 20 ms. The driver regards neither of them as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -75,9 +78,10 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
 @pytest.mark.parametrize("stall_s", [0.8, 2.0])
 @pytest.mark.parametrize("room", [READ, EVERYTHING])
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
-    """The driver stalls. The terminal's buffer keeps the lines of 0.37 s, or all lines.
+    """The driver stalls, and the boards' lines wait in the terminal's buffer.
 
-    All samples in the buffer are published, with the times at which the board took them.
+    The buffer has room for the lines of 0.37 s, or for all lines. All samples in it are published
+    later, with the times at which the board took them.
     """
     bench = nominal()
     bench.run(1.0)
@@ -93,11 +97,11 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
-    """After a stall, the driver is busy with the first read, so the second read is late as well.
+    """After a stall, the driver needs long for the first read, so the second read is late too.
 
-    Bytes are lost between the two reads. The driver leaves out the first sample after the lost
-    bytes, because no earlier pose shows its time. All other samples get the times at which the
-    board took them.
+    Bytes are lost between the two reads. The driver does not publish the first sample after the
+    lost bytes, because no pose arrives between them that could show its time. All other samples get
+    the times at which the board took them.
     """
     bench = nominal()
     bench.run(1.0)

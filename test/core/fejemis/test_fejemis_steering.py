@@ -117,9 +117,10 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 
 @given(rates, angles)
 def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> None:
-    """A turn on the spot is commanded.
+    """The user commands a turn on the spot.
 
-    The drive board is commanded to stop as long as the front wheel is not within 5° of ±90°.
+    As long as the front wheel is not within 5° of ±90°, the driver commands the drive board to
+    stop.
     """
     assume(abs(w) > 0.01)
     told = steer(BodyTwist(0.0, 0.0, w), ROBOT, angle_rad, turning=False)
@@ -155,7 +156,7 @@ COMMANDS = [
     *((0.15, w) for w in (-1.0, 0.05)),
     *((0.6, w) for w in (0.0, 0.5)),
 ]
-"""Speeds in m/s and turn rates in rad/s."""
+"""Commands that a test gives to the robot: pairs of a speed in m/s and a turn rate in rad/s."""
 
 
 @pytest.mark.slow
@@ -240,7 +241,7 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
 def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
     """The parameter ``allow_reverse`` is off, and the user commands a motion backward.
 
-    The robot only turns. One notice names the parameter.
+    The robot only turns. A single notice to the user names ``allow_reverse``.
     """
     bench = nominal()
     bench.drive_on(v, w, 3.0)
@@ -252,11 +253,11 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
-    """Motion is refused after two stops by the motion monitor, and a sender repeats -0.3 m/s.
+    """The motion monitor has stopped the robot twice, so the driver refuses motion commands.
 
-    While ``allow_reverse`` is off, the driver takes this for a command to stand still, and accepts
-    it. Then the user sets ``allow_reverse``. The robot stays at rest, and the driver refuses the
-    next command of the sender.
+    A node repeats the command -0.3 m/s. While ``allow_reverse`` is off, the driver reduces the
+    speed to zero. It accepts this, because it is not a motion. Then the user sets
+    ``allow_reverse``. The robot stays at rest, and the driver refuses the node's next command.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):
@@ -276,7 +277,10 @@ def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
-    """The firmware mirrors the angle in reverse. The robot follows a commanded curve backward."""
+    """In this firmware, the front wheel takes the same angle for a curve backward as forward.
+
+    The robot follows a curve that the user commands backward.
+    """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)
     )

@@ -45,7 +45,10 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
 
 @pytest.mark.slow
 def test_gains_that_are_set_need_no_words() -> None:
-    """The notice names only gains that are not set, and does not appear if all are set."""
+    """The notice about missing gains names only the gains that the user has not set.
+
+    It does not appear if all gains are set.
+    """
     assert told(opened(HOST_GAINS)) == []
     written = {name: one for name, one in HOST_GAINS.written.items() if name != Setting.RIGHT_TN}
     (sentence,) = told(opened(replace(HOST_GAINS, written=written)))
@@ -77,9 +80,10 @@ def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None
 
 
 def test_no_line_follows_the_request_for_a_date_directly() -> None:
-    """The last line of a round requests a date. The next line follows at least 20 ms later.
+    """The driver writes its settings in rounds. The last line of a round requests a date.
 
-    In this time, the board can answer. While it sends, it receives nothing.
+    The board receives nothing while it sends the date. So the driver sends the next line at least
+    20 ms after the request.
     """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)

@@ -224,9 +224,10 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The board loses power within a line. The notice says that no data arrives.
+    """The board loses power while it sends a line of text, so only a part of the line arrives.
 
-    The notice does not say that the baud rate may be wrong.
+    The notice to the user says that no data arrives. It does not say that the baud rate may be
+    wrong.
     """
     bench = Bench("firmware")
     while not bench.board._uart.sending:
@@ -311,8 +312,8 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
 def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_s: float) -> None:
     """The user resets the board while older tick counts are still on their way to the driver.
 
-    After these, the driver reads counts of 0. It does not take the difference for a motion, and
-    does not conclude from it that the board counts backward.
+    After these counts, the driver reads counts of 0. It does not take this decrease for a motion.
+    It also does not conclude that the board counts backward.
 
     ``stall_s``: time in s, just before the reset, in which the driver reads nothing.
     """
@@ -341,9 +342,9 @@ def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_
 
 
 def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
-    """The user switches the LED on, and off again while the first request is still being repeated.
+    """The driver repeats each request for the LED several times, because it may be lost.
 
-    After the first request to switch it off, no request to switch it on is sent.
+    The user switches the LED on, and soon afterwards off. The driver then repeats only "off".
     """
     bench = Bench("firmware")
     board = bench.session.board
@@ -361,10 +362,10 @@ def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
 @FIRMWARE
 @pytest.mark.slow
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped(firmware: str) -> None:
-    """A robot drives at 0.8 m/s. The command is 0.2 m/s, and the set limit 0.6 m/s.
+    """A robot drives at 0.8 m/s. The command is 0.2 m/s, and ``fastest_linear_speed`` is 0.6 m/s.
 
-    So all displacements seem impossible. A single one could be a correction of the odometry, but
-    four in a row are a fault: the driver stops the robot.
+    So all displacements seem impossible. A single impossible displacement could be a correction of
+    the odometry. After four of them in a row, the driver stops the robot.
     """
     bench = Bench(firmware)
     bench.session.configure(replace(SETTINGS, motion=MotionLimits(fastest_mps=0.6)), bench.now)

@@ -126,9 +126,10 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a wheel can roll steadily above its set-point.
+    """With feed-forward, a wheel can roll at a constant speed above its set-point.
 
-    A constant speed then shows rest only if the other wheel's speed changes.
+    So a constant reported speed does not show that the wheel is at rest. It does so only if the
+    other wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -157,9 +158,10 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel's reported speed is near its set-point, but the odometry assumes it at rest.
+    """The reported speed of a wheel is just above its set-point. The odometry assumes it at rest.
 
-    The wheel gets no power, so it looks stalled.
+    If it is at rest, it does not start: the controller uses the reported speed and gives no power.
+    So the wheel looks stalled.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -199,13 +201,14 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     right_rpm: int,
 ) -> None:
-    """A wheel's reported speed stays the same while that of the other wheel varies.
+    """The right wheel's reported speed stays the same while the left wheel's speed varies.
 
-    So the wheel may be at rest. But its speed is high, so it may also still roll. The driver sends
-    RPM 0/0 to start the wheel again, and the odometry keeps the distance that the wheel has rolled.
+    So the right wheel may be at rest. But its reported speed is high, so it may also roll. The
+    driver sends RPM 0/0 to start the wheel again. The odometry keeps the distance that the wheel
+    has rolled.
 
-    ``right_rpm``: reported speed of the wheel. Its set-point is −31 RPM. A speed of −68 RPM is that
-    of a wheel whose saturated controller keeps full power.
+    ``right_rpm``: reported speed of the right wheel. Its set-point is −31 RPM. At −68 RPM, the
+    controller of the wheel is saturated and keeps full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
@@ -233,9 +236,9 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """After a forward drive, the wheels are blocked and commanded backward.
+    """After a forward drive, the user commands the robot backward, but the wheels are blocked.
 
-    The pose then moves less than 0.15 m.
+    The odometry does not subtract the forward drive again: its pose moves by less than 0.15 m.
 
     ``reset``: whether the odometry is reset before the backward command.
     """

@@ -63,7 +63,7 @@ class NetworkRobot(MartRobot):
         return out
 
     def _due_s(self) -> float:
-        """Return the board time, in s, before which nothing happens in the board or network."""
+        """Return the board time, in s, of the next event in the board or the network."""
         command, stop = self.network
         return min(
             self.board.server.wake_at,
@@ -196,7 +196,10 @@ class MartBench(AnyBench):
         return self.odometry[-1].pose - self.truth
 
     def said(self, since: int = 0) -> list[bytes]:
-        """Return the driver's datagrams from number ``since`` on, without its regular queries."""
+        """Return the driver's datagrams without its regular queries.
+
+        ``since``: number of the first datagrams to leave out.
+        """
         return [data for _, data in self.written[since:] if data not in POLLS]
 
     def job(self, job: Job, *arguments: object, limit_s: float = 95.0) -> JobDone:

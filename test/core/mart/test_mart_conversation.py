@@ -67,7 +67,10 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """A reply answers the pending request. The answer also has the time that the reply took."""
+    """A reply answers the pending request.
+
+    ``Conversation.hear`` returns the request and the time from the request to the reply.
+    """
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -114,10 +117,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """A late ok to another command could be taken for the ok to RST IMU, the check of the IMU.
+    """RST IMU checks the IMU. A late ok to an earlier command could be taken for its reply.
 
-    So the driver waits before it sends RST IMU. It waits so long that such a late ok arrives before
-    the earliest possible reply to RST IMU.
+    So the driver delays RST IMU. The delay is long enough that a late ok arrives before RST IMU can
+    be answered.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -313,9 +316,9 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """A forward drive (RM) sets the heading to zero, but the next reply still has the old heading.
+    """A forward drive (RM) sets the server's heading to zero. The next reply has the old heading.
 
-    So this reply is late, and the odometry does not use its heading.
+    The server sent this reply before RM began, so the odometry does not use its heading.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))

@@ -34,8 +34,9 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Let the robot make two motions that end with equal encoder counts, and return the bench.
 
-    In each motion, no reply arrives from the start until ``quiet_s`` after the driver begins to
-    stop the motion. Check that the covariance covers the error all the time.
+    In each motion, no reply arrives for a time. This time begins with the start of the motion. It
+    ends ``quiet_s`` after the driver begins to stop the motion. Later, the function checks again
+    and again that the covariance covers the error.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -58,7 +59,10 @@ def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench
 def test_a_drive_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     speed_mps: float,
 ) -> None:
-    """Only the replies to the stops of two equal drives arrive. The odometry adds both drives."""
+    """Two drives end with equal encoder counts. Only the replies to their stop requests arrive.
+
+    The odometry still adds both drives.
+    """
     error = after_equal_motions((speed_mps, 0.0), 0.05).error
     assert error.way_m < 0.05
     assert abs(error.yaw_rad) < 0.02
@@ -80,9 +84,9 @@ def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_t
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The ok reply to the check of the IMU comes twice, and the start of a turn (L) is lost.
+    """The start request of a turn (L) is lost. A copy of an earlier ok arrives, but no reply to L.
 
-    The encoder count is unchanged, so the second ok does not confirm the turn.
+    The encoder count does not change, so the driver does not take this ok for a turn.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -143,9 +147,10 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """After a second motion the encoder count is unchanged.
+    """After a second motion, the encoder count is the same as after the first motion.
 
-    Either the start was lost, or the motions were equal. The covariance covers both.
+    Either the server never got the second start, or the second motion was equal to the first. The
+    covariance covers the error in both cases.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -174,10 +179,10 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether a motion had begun before it was stopped. None: the replies do not show this.
+    """Return whether the replies show that a motion had begun before it was stopped.
 
-    The motion is started at 8 s. The driver sends stops at 10 s and 10.3 s. ``replies``: time in s
-    and bytes of each reply.
+    The result is None if they do not show whether it had begun. The driver requests the motion at
+    8 s, and a stop at 10 s and 10.3 s. ``replies``: time in s and bytes of each reply.
     """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)
@@ -224,7 +229,7 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
     """The server answers two different queries (MCSTAT and ENC) with 0, again and again.
 
-    No answer is taken for a copy of the other query's answer.
+    The driver does not take these equal answers for copies of each other.
     """
     talk = Conversation(0.3)
     for n in range(3):
@@ -359,10 +364,10 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """The network may duplicate a speed change, which then acts twice. Only the heading shows this.
+    """The network may duplicate the request of a speed change, and the change then acts twice.
 
-    In a backward drive, the heading may be unknown. So a single change is at most 15 units forward,
-    and 5 backward.
+    Only the heading can show that it has acted twice. In a backward drive, the heading may be
+    unknown. So a change is at most 15 units in a forward drive, and 5 units in a backward drive.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

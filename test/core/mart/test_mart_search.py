@@ -42,9 +42,10 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """Up to two copies and one reply are late, and the IMU may die at any step.
+    """The search finds no failure of the server.
 
-    The search finds no failure.
+    It tries all cases in which up to two copies and one reply are late. The IMU may die at any
+    step.
     """
     found = search()
     assert found.bad == ()
@@ -82,7 +83,7 @@ def test_a_planted_trap_is_found(trap: str) -> None:
 def test_a_driver_that_does_not_wait_for_late_copies_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The model is changed: its driver does not wait for late copies of commands.
+    """The test changes the model: the modelled driver does not wait for late copies of commands.
 
     The search finds a copy that does harm.
     """
@@ -93,10 +94,10 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The model is changed: after SL on the stop port, its driver sends SRM, the usual stop.
+    """The test changes the model: the modelled driver sends SRM, a stop, directly after SL.
 
-    The real driver first sends queries that show whether a motion continues. Without them, SRM can
-    hang the server. The search finds this failure.
+    The real driver first sends queries that show whether a motion continues, because SRM can hang
+    the server. The search finds that the changed driver hangs it.
     """
 
     def sweeps(world: World) -> model.Step:
@@ -142,10 +143,10 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return the server's state for a comparison.
+    """Return the part of the server's state in which model and firmware must agree.
 
-    A server whose command port is silent does not show its motion, nor why the port is silent.
-    These parts of its state are replaced by fixed values.
+    A server whose command port is silent does not show its motion, or why the port is silent. In
+    such a state, these values are replaced by fixed ones.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

@@ -25,8 +25,8 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""The bit to change: kind of frame, byte of its payload, and bit of that byte. The last number is
-how many ticks to drive before the change."""
+"""Tuples that say which bit to change, and when: the kind of frame, the number of a byte in its
+payload, the number of a bit in this byte, and how many ticks the robot drives before the change."""
 
 
 class Drive:
@@ -56,7 +56,10 @@ class Drive:
         return Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau))
 
     def run(self, seconds: float) -> None:
-        """Drive curves for ``seconds``, and record the worst error since the bit was changed."""
+        """Drive curves for ``seconds``. Record the last and the worst error of odom.
+
+        Errors are recorded only after ``arm`` has changed a bit.
+        """
         for _ in range(round(seconds / TICK_S)):
             t, before = self.bench.now, len(self.bench.events)
             if self.bench.session.state == "nominal" and round(t / TICK_S) % 5 == 0:

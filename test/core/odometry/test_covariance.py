@@ -183,9 +183,9 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board computes its pose from the wheels, so this pose contains the errors of the wheels.
+    """Only a pose that ends a gap reduces the covariance. In this test, no pose ends a gap.
 
-    A pose that does not end a gap therefore does not reduce the covariance.
+    The board computes its pose from the wheels, like the odometry. So both have the wheels' errors.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -273,7 +273,8 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 def test_flush_tells_what_can_still_be_told() -> None:
     """``flush`` returns a complete frame that the decoder has held. It returns no incomplete frame.
 
-    Before the decoder is in step, ``flush`` does not return a complete frame either.
+    Before the decoder has found the sequence of frames in the stream, ``flush`` returns no complete
+    frame either.
     """
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()

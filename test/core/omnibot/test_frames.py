@@ -204,7 +204,7 @@ def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
 def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -> None:
     """A coordinate is rounded to a 32-bit float.
 
-    One that is too large for such a float is refused.
+    A coordinate that is too large for a 32-bit float is refused.
     """
     wide = PoseFrame(x, pose.y, pose.theta, pose.seq)
     try:

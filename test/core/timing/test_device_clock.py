@@ -293,9 +293,9 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """A false displacement arrives among true displacements. Its count seems to show a restart.
+    """A false displacement arrives among true ones. It seems to show a restart of the board.
 
-    But the stamps of the samples stay 10 ms apart.
+    The clock is not disturbed: the stamps of the samples stay 10 ms apart.
     """
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)

@@ -76,7 +76,10 @@ def description() -> Any:
 
 
 def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
-    """The description has the driver's joints and frames. The steering axis points up."""
+    """The robot description (URDF) has the driver's joints and frames.
+
+    The steering axis points up.
+    """
     robot = description()
     assert robot.get_root() == PARAMETERS.by_name["base_frame"].default
     turning = [joint.name for joint in robot.joints if joint.type != "fixed"]
@@ -87,7 +90,7 @@ def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
 
 
 def test_the_description_has_the_drivers_sizes() -> None:
-    """The track width and the wheelbase of the description are the driver's defaults."""
+    """Track width and wheelbase in the robot description (URDF) are the driver's defaults."""
     joints = description().joint_map
     left, right = (joints[name].origin.xyz for name in WHEELS.joints)
     assert left[1] - right[1] == WHEELS.track_m
@@ -95,7 +98,10 @@ def test_the_description_has_the_drivers_sizes() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """Both costmaps of Nav2 have the same footprint. It encloses the wheels of the description."""
+    """Both costmaps of Nav2 have the same footprint.
+
+    It encloses the wheels of the robot description (URDF).
+    """
     file = load("nav2_fejemis.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

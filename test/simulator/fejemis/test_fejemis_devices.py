@@ -11,7 +11,8 @@ from fejemis_rig import DRIVE, FRONT, Rig
 def test_brush_and_lift() -> None:
     """``brush`` turns the brush on or off. At 6 V, the lift takes 12 s from end to end.
 
-    The lift stops after the time in ``motv``, or at 0 V.
+    The command ``motv`` has a voltage and a time. The lift stops after this time, or if another
+    ``motv`` sets 0 V.
     """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")

@@ -33,9 +33,9 @@ def test_every_quirk_has_its_sight() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """On the public firmware, each detector finds its quirk.
+    """Each quirk has a detector, which finds the quirk on a board with the public firmware.
 
-    If only this quirk is switched off, the detector does not find it.
+    If only this quirk is switched off on the board, its detector does not find it.
     """
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
@@ -44,7 +44,7 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
-    """On a board as in the manual, all quirks are off. No detector finds its quirk."""
+    """A board that follows the manual has no quirks, so no detector finds a quirk on it."""
     assert not SEEN[name](DOCUMENTED)
 
 

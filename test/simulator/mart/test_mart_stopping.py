@@ -184,9 +184,9 @@ def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
 @pytest.mark.parametrize("start", ["F", "B SLOW", "RM 30"])
 @pytest.mark.parametrize("after_s", [0.001, 0.03, 0.06])
 def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: float) -> None:
-    """A stop on the stop port (SL or SS) comes before the reply to a start.
+    """The server receives a stop (SL or SS) before it has replied to the start of a drive.
 
-    It has no effect, and the robot drives on.
+    The stop has no effect, and the robot drives on.
     """
     rig = Rig()
     rig.say(start)

@@ -11,9 +11,9 @@ disc at which the board counts a tick. The calculation is for three kinds of noi
 
 - "each time": every time between ticks has an independent error of 10 %.
 - "other marks": the marks are displaced by 10 %, differently in each turn.
-- "same marks": the marks have known positions. Only the rounding to 0.1 ms remains.
+- "same marks": the marks have known positions. The only noise is the rounding to 0.1 ms.
 
-The load and the rate change by 0.5 % between records.
+For each kind of noise, the load and the rate change by 0.5 % between records.
 """
 
 from random import Random

@@ -28,8 +28,8 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
 
-    ``calibrate step`` finds the plants, and sets corrections and gains in the driver. All of these
-    values are allowed in the calibration file.
+    ``calibrate step`` finds the constants of both wheels, and sets corrections and gains in the
+    driver. All of these values are allowed in the calibration file.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
