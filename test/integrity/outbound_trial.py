@@ -137,9 +137,9 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Count the next writes as arrived without playing them, as far as they change nothing.
+        """Skip the next writes that arrive undamaged and change nothing, except the last of them.
 
-        These are writes that arrive undamaged. The last of them is not skipped.
+        The skipped writes count as arrived.
         """
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1

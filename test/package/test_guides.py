@@ -97,7 +97,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 def test_what_the_driver_tells_is_explained() -> None:
     """The troubleshooting guide has a row for each message of the driver.
 
-    A row belongs to a message if it contains the beginning of the message. It also does if the
+    A row can belong to a message in two ways: it contains the beginning of the message, or the
     message contains all parts that the row quotes.
     """
 

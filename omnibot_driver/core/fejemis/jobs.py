@@ -280,8 +280,7 @@ def _answers(role: Role, message: Message) -> bool:
 
     ``eer`` is the command to load the configuration. The board does not answer it. So the driver
     then sends a query: ``confi`` to the drive board, ``fwoi`` to the front board. An answer shows
-    that the board receives lines. A front board that does not know ``fwoi`` answers that it is
-    unhandled.
+    that the board receives lines. A front board that does not know ``fwoi`` answers "unhandled".
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

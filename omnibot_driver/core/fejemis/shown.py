@@ -14,8 +14,8 @@ from omnibot_driver.core.fejemis.upkeep import Upkeep
 SHOWN: Final = 3
 """Largest number of unknown lines in the diagnostics.
 
-An unknown line is a line from the driver to which the firmware has answered that it does not know
-it. The diagnostics show the latest unknown lines.
+An unknown line is a line from the driver that the firmware has answered as unknown. The diagnostics
+show the latest of these lines.
 """
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 

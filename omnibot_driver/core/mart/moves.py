@@ -127,7 +127,7 @@ class Moves(Asking):
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
         After a turn on a good network, the driver first downloads the server's record of the turn.
-        It learns from this record instead, which is more exact than the wheel's measurement.
+        It then learns from the record, which is more exact than the wheel's measurement.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -213,8 +213,8 @@ class Moves(Asking):
         """Return whether the driver may have stopped a second run of a controlled move.
 
         The result is False if the driver has sent no stop after the move. It is also False if the
-        move was complete and the server answered again very soon. A second run keeps the server
-        from answering for longer, whether a stop ends it or it ends by itself.
+        move was complete and the server answered again very soon. A second run would have delayed
+        this answer more, whether a stop ended it or it ended by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
@@ -229,7 +229,7 @@ class Moves(Asking):
         self._notice(CONTRADICTED.format(asked_deg, seen_deg) + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
-        """Discard the goal, because the network may have duplicated its last move request."""
+        """Discard the goal, because the network may have duplicated the last move towards it."""
         if self._move is None or self._move.given_up:
             return
         self._move.fail()

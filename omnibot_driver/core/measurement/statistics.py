@@ -23,10 +23,9 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. From it and the duration of a displacement, the
-      number of IMU readings is computed that the board has sent in this time. If fewer have
-      arrived, the others are counted as lost. The period is None if the IMU readings themselves
-      say how many were lost (``lost``).
+    * ``imu_period_s``: period of the IMU in s. It shows how many IMU readings the board has sent
+      during a displacement. If fewer readings have arrived, the missing ones are counted as lost.
+      The period is None if the IMU readings themselves say how many were lost (``lost``).
     """
 
     imu_period_s: float | None = None

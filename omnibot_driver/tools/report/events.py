@@ -19,8 +19,8 @@ SILENT_S: Final = 2.0
 """Time in s after which a state must appear in /diagnostics, if the driver still runs.
 
 The time is counted from the beginning of the state. "disconnected" is the last state of a driver
-that has ended, or of one that has lost its board. Only the latter still reports it in /diagnostics
-after this time.
+that has ended, or of one that has lost its board. A driver that has lost its board still reports
+the state in /diagnostics after this time.
 """
 
 

@@ -42,7 +42,7 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """The search finds no failure of the server.
+    """The search finds no failure: the server never hangs, and the robot can always be stopped.
 
     It tries all cases in which up to two copies and one reply are late. The IMU may die at any
     step.
