@@ -22,7 +22,8 @@ LATCHED_BEAT = b"e"
 """Heartbeat of a driver whose e-stop is latched."""
 WORDS = b"="
 END = b"\n"
-"""End of a message that begins with ``=``. Such a message replaces both stop commands."""
+"""End of a message that begins with ``WORDS``. The message gives the guard a new stop command and a
+new emergency stop."""
 BYE = b"!"
 """Message that ends the guard. The driver sends it after it has stopped the robot itself."""
 WRITTEN = b"w"
@@ -87,10 +88,12 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int], drop: bool) -> None:
-    """Write the stop command 20 times. End earlier if ``until`` has input or all lines are lost.
+    """Write the stop command ``last_words`` to its lines 20 times.
 
-    ``until``: descriptors. Input from the driver shows that the driver runs again, and can stop the
-    robot itself. ``drop``: whether to discard the driver's unsent output first.
+    End earlier if all lines are lost, or if a descriptor in ``until`` has input. Such input comes
+    from the driver. It shows that the driver runs again, and can stop the robot itself.
+
+    ``drop``: whether to discard first what the driver has written and the lines have not sent yet.
     """
     lines = {line for line, _ in last_words}
     for line in lines if drop else ():

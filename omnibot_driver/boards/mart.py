@@ -90,7 +90,10 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's topics and services; return a publishing function per reading type."""
+    """Create this board's topics and services.
+
+    Return, for each type of reading, the function that publishes it.
+    """
     from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
 
     publish: Mapping[type, Any] = MartTopics(node, link, values).publish

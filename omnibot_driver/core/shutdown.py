@@ -51,8 +51,8 @@ class Shutdown:
     def fall_silent(self, now: float) -> bool:
         """End the repetition of Stop, and demand a new proof that the robot stands still.
 
-        The new proof shows that the line has not damaged the last Stop. If no proof is possible, or
-        the e-stop is latched, change nothing and return False.
+        The new proof shows that the last Stop was not damaged on the line. If no proof is possible,
+        or if the e-stop is latched, this method changes nothing and returns False.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False
@@ -69,7 +69,10 @@ class Shutdown:
         return packets + self._estop_again()
 
     def broken_off(self) -> Packets:
-        """Return the packets to write before the port is closed, if a write failed half-way."""
+        """Return the packets to write before the port is closed, if a write failed half-way.
+
+        These packets wake the board. If the e-stop is latched, they also repeat the emergency stop.
+        """
         return self._board.wake() + self._estop_again()
 
     def _estop_again(self) -> Packets:

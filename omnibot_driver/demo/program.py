@@ -19,10 +19,10 @@ class DemoFailed(Exception):
 
 
 class Program:
-    """A module of this package as a child process.
+    """A module of this package that runs as a child process.
 
-    Ctrl-C does not reach the child process. ``end`` ends the child process. The kernel ends it if
-    this program ends first.
+    Ctrl-C does not reach the child process. The method ``end`` ends it. If this program ends
+    earlier, the kernel ends the child process.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:

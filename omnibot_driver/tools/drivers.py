@@ -36,9 +36,10 @@ def running_drivers(node: Any) -> list[str]:
 
 
 def discovery_advice(environment: Mapping[str, str] = os.environ) -> str:
-    """Return a text to append to a message about a driver that was not found; usually empty.
+    """Return advice to append to the message that no driver was found; usually empty.
 
-    With a discovery server, only a process that is a super client can list the running drivers.
+    The advice is for a tool that uses a discovery server, but is not a super client. Such a tool
+    cannot list the running drivers.
     """
     if not environment.get("ROS_DISCOVERY_SERVER"):
         return ""

@@ -22,9 +22,10 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit of the time between the arrivals of two successive samples, in periods.
 
-The limit is used only if both samples seem to be late by about a period or more. If the time
-between their arrivals exceeds the limit, a sample before them was lost. If not, both samples have
-waited because the host stalled, and no sample was lost.
+The driver uses the limit only if both samples seem to be late by about a period or more. If the
+time between the arrivals is above the limit, the samples are not late: an earlier sample was lost.
+If the time is below the limit, both samples have waited because the host stalled, and no sample was
+lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
@@ -35,7 +36,7 @@ BLOCK: Final = 100
 class ImuSamples:
     """Converter of IMU samples to readings, and of their arrival times to sampling times.
 
-    ``unit``: unit of the acceleration lines.
+    ``unit``: unit in which the board sends accelerations.
 
     ``rates``, ``forces``: the last sample in rad/s and in m/s²; NaN before the first.
     """
@@ -105,8 +106,9 @@ class ImuSamples:
     def _follow(self, delay_s: float) -> None:
         """Set the phase of the sampling times, after a sample that arrived ``delay_s`` late.
 
-        The phase is as late as possible, but no recent sample may arrive before its sampling time.
-        The recent samples are the last three blocks of 100 samples, and all samples since then.
+        The new phase is the latest one with which no recent sample arrives before its sampling
+        time. The recent samples are the last three blocks of 100 samples, and all samples after
+        these blocks.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

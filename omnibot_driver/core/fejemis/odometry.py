@@ -15,9 +15,9 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction by which one displacement corrects the wheels' motion towards a pose.
+"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects.
 
-The correction is this small only if rounding of the pose can explain the difference.
+The driver uses this small fraction only if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference that rounding of the poses explains, in units of their last digit. Each of two
@@ -51,7 +51,7 @@ class PoseOdometry:
     def __init__(self, track_m: float) -> None:
         self.track_m = track_m
         self.refused = 0
-        """How many poses were rejected."""
+        """Number of rejected poses."""
         self._pose: BoardPose | None = None
         self._told = Pose()
         self._restarted = False
@@ -90,8 +90,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement up to ``pose``; every 0.2 s, return also a PoseReading.
 
-        The PoseReading contains the sum of all displacements. The driver may later reject some of
-        these displacements; the sum includes them nevertheless.
+        The PoseReading contains the sum of all displacements. The sum includes every displacement,
+        even if the driver rejects it later.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

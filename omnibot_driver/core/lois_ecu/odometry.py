@@ -58,8 +58,9 @@ class LoisOdometry:
         self._begun = False
         self._estimated = False
         """Whether no time has passed since the last estimate. While this is true, the wheels keep
-        their ``blind`` flags. One read may contain the ticks of the estimate and then an odometry
-        report. The flags allow this report to correct the motion before the estimate."""
+        their ``blind`` flags. The reason: one read may contain the ticks that gave the estimate,
+        and then an odometry report. With the flags, this report can still correct the motion before
+        the estimate."""
         self._may_roll_mps = 0.0, 0.0
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -97,7 +98,7 @@ class LoisOdometry:
 
     @property
     def appends(self) -> bool:
-        """Whether the board appends odometry to its ticks, as the public firmware does."""
+        """Whether the board sends odometry directly after ticks, as the public firmware does."""
         return self._kind.appends
 
     @property
@@ -107,7 +108,7 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """For each wheel: whether it is assumed at rest although it is commanded backward."""
+        """For each wheel: whether it is assumed to be at rest while it is commanded backward."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 
@@ -146,9 +147,9 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether counts near zero can only come from a restart of the board.
 
-        This is so if they differ from the prediction by more than the wheels can have rolled. If
-        the robot is at rest, the counts must also be very small: larger counts may come from a
-        push.
+        Only a restart explains the counts if they differ from the prediction by more than the
+        wheels can have rolled. If the robot is at rest, the counts must also be very small, because
+        larger counts may come from a push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -162,8 +163,9 @@ class LoisOdometry:
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
         """Add an error to each wheel's distance, because the board may have restarted unnoticed.
 
-        The error is the difference between the reported and the expected ticks. Its cause may be a
-        restart, after which the counts begin at zero, or true motion.
+        The size of the error is the difference between the reported and the expected ticks. The
+        driver does not know the cause of this difference. It may be a restart, after which the
+        counts begin at zero. It may also be a true motion of the wheel.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -205,7 +207,7 @@ class LoisOdometry:
     def stalled(self, wheels: tuple[bool, bool]) -> None:
         """Record which wheels have stalled.
 
-        A stalled wheel is assumed to be at rest since its reported speed last changed.
+        The driver assumes that a stalled wheel came to rest when its reported speed last changed.
         """
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
@@ -253,8 +255,8 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process an odometry report, which corrects the next predictions and estimates.
 
-        The report is message 0x20. In the public firmware, it is a message 0x12 directly after the
-        ticks.
+        According to the manual, the report is a message 0x20. The public firmware sends it as a
+        message 0x12 directly after the ticks.
 
         ``late_s``: how much later than usual the report arrived, in s.
         """

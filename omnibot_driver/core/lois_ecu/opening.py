@@ -37,11 +37,11 @@ LINE_S: Final = 0.02
 # and the end of another line could form a new motion command.
 AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting, for example for the
-LED. It is shorter than the time between two set-points."""
+LED. The time between two set-points is longer, so such a command can be sent between them."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 """Delays in s from a tick report to the next round of settings, or to a request for a date. The
-delays are used in turn, because the board cannot receive while it sends. With a constant delay,
-each round could fall into a time in which the board sends."""
+board cannot receive while it sends. With a constant delay, each round could fall into a time in
+which the board sends. So the driver uses these delays in turn."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
@@ -75,13 +75,15 @@ class SettingsWriter:
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = self._repeated = 0
         self.overwritten = False
-        """Whether the terminal mode was written, which overwrites "left short correction"."""
+        """Whether the driver has written the terminal mode. This also overwrites the setting "left
+        short correction", so the driver must write that setting again."""
 
     @property
     def confirmed(self) -> bool:
         """Whether the settings are confirmed.
 
-        A GPS date has then arrived, and ticks arrive with the set period.
+        They are confirmed when a GPS date has arrived, and ticks arrive with the period in the
+        settings.
         """
         return self._answered and self._in_period
 
@@ -94,8 +96,8 @@ class SettingsWriter:
     def ignored(self) -> bool:
         """Whether the board seems to ignore the settings.
 
-        The settings were then sent in twice the usual number of rounds, and are still not
-        confirmed.
+        This is the case if the driver has sent the settings in twice the usual number of rounds,
+        and they are still not confirmed.
         """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
 
@@ -106,9 +108,10 @@ class SettingsWriter:
 
     @property
     def _waits(self) -> bool:
-        """Whether settings must wait until the robot stops.
+        """Whether the driver must wait until the robot stops before it writes settings.
 
-        Writing a gain resets the wheel's controller. The first ``ROUNDS`` rounds do not wait.
+        The reason: writing a gain resets the controller of a wheel. The driver writes the first
+        ``ROUNDS`` rounds even while the robot drives.
         """
         return self._points.driving and self._rounds >= ROUNDS
 
@@ -137,7 +140,8 @@ class SettingsWriter:
     def repeat(self, now: float) -> None:
         """Write all settings again, as soon as no motion is commanded.
 
-        Called if a wheel does not start, because all lines of its low-pass may have been lost.
+        The caller calls this method if a wheel does not start. The board may then have no low-pass
+        coefficient, because all lines that write it were lost.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
@@ -169,9 +173,9 @@ class SettingsWriter:
         self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
     def ticks_came(self, now: float) -> None:
-        """Record the arrival of ticks, and check whether they arrive with the set period.
+        """Record the arrival of ticks, and check whether they come with the period in the settings.
 
-        While the settings are unconfirmed, this method also plans the next round.
+        While the settings are unconfirmed, this method also plans the next round of settings.
         """
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
@@ -218,14 +222,14 @@ class SettingsWriter:
         self._round_at_s = max(self._round_at_s, at_s)
 
     def _turned(self, rounds: int) -> list[Command]:
-        """Return the commands of a round, in an order that differs from round to round.
+        """Return the commands of a round, in an order that changes from round to round.
 
-        Each round begins with a different command. With a constant order, a board that sends one
-        report in each round could miss the same line each time.
+        A board may send one report in each round. If the order of the commands were constant, this
+        board could miss the same line in each round.
 
-        The request for a date comes last. The board answers it at once, and receives nothing while
-        it sends, so it would miss a setting that follows directly. Pauses between the lines do not
-        prevent this: a busy computer may write all lines of a round together.
+        The request for a date comes last. The board answers this request at once, and receives
+        nothing while it sends. So it would miss a setting that follows directly. Pauses between the
+        lines do not prevent this, because a busy computer may write all lines of a round together.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order
@@ -237,7 +241,10 @@ class SettingsWriter:
         return [*found[:first], *rest[place:], *rest[:place], *asked]
 
     def commands(self) -> Iterable[Command]:
-        """Yield the commands that write settings, in the order of the first round."""
+        """Yield the commands that write settings.
+
+        ``_turned`` changes their order from round to round.
+        """
         settings = self.settings
         if not settings.with_sum:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)

@@ -36,7 +36,8 @@ speed to the next. A larger change is an error of measurement, because a tick wa
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported
-and an expected speed. It applies only with a constant set-point and gains that the user set."""
+and an expected speed. This limit applies only while the set-point is constant, and only if the user
+has set the controller's gains."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks to subtract from the distance of a wheel that came to rest. Such a wheel has
 rolled less far than its last speed suggests."""
@@ -45,13 +46,13 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a speed controller while its wheel does not tick, as a fraction of
-``WINDUP_M``. The controller of a wheel at rest integrates the speed error, and starts the wheel
-when the integral is ``WINDUP_M``."""
+"""Largest assumed integral of a speed controller while its wheel does not tick. The unit is
+``WINDUP_M``: the controller of a wheel at rest integrates the speed error, and starts the wheel
+when the integral reaches ``WINDUP_M``."""
 
 
 class ReportedSpeed:
-    """Correction of the motion filter ``motion`` by the reported speed of one wheel.
+    """Corrects the motion filter ``motion`` by the speeds that the board reports for one wheel.
 
     ``index``: 0 for the left wheel, 1 for the right wheel.
     """
@@ -64,13 +65,14 @@ class ReportedSpeed:
         self._jumped = False
         self._doubted_m = 0.0
         """Standard deviation in m that was added to the wheel's distance since the wheel's reported
-        speed last changed. Since then, the wheel may have been at rest."""
+        speed last changed. The reason for this addition: the wheel may have been at rest since that
+        change."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Pass the wheel's estimated speed to ``resting``.
+        """Pass the wheel's estimated speed to ``resting``, because the board has reported no speed.
 
-        The caller calls this when the board reported no speed in the last ``duration_s``.
+        ``duration_s``: time in s, until now, for which the board has reported no speed.
         """
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
@@ -79,8 +81,9 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance added since it stopped.
 
-        The driver assumes that the wheel stopped when its reported speed last changed. If a command
-        to start came later, and the wheel did not obey it, the time of this command is used.
+        The driver usually assumes that the wheel stopped when its reported speed last changed. But
+        a command to start may have come after this change. If the wheel did not obey this command,
+        the driver assumes that the wheel stopped at the time of the command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -174,9 +177,10 @@ class ReportedSpeed:
     def _doubt_rolling(self, chance: float) -> None:
         """Add the error of a wheel that may be at rest, but is estimated as rolling.
 
-        If it is at rest, the whole distance since its reported speed last changed is wrong. So the
-        errors of successive reports are not independent. The board's odometry (0x20) does not show
-        this error, because the board uses the old speed.
+        If the wheel is at rest, the whole distance since its reported speed last changed is wrong.
+        This error grows from report to report, so the errors of successive reports are not
+        independent. The board's odometry (0x20) does not show the error, because the board also
+        computes with the old speed.
 
         ``chance``: probability that the wheel is at rest.
         """

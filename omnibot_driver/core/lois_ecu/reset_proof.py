@@ -15,15 +15,18 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 # A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
 FEW_TURNS: Final = 0.3
 FEW_TICKS: Final = 2
-"""Together, the largest assumed motion of a wheel after it was stopped: 0.4 s at 50 RPM."""
+"""``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS`` ticks: the largest motion that is assumed for
+a wheel after it was stopped, 0.4 s at 50 RPM."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
-"""Together, a motion that no wheel can make between a reset and the next counts. If a count falls
-by at least this motion, and is then near zero, the board has obeyed the reset."""
+"""``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: a motion that no wheel can make
+between a reset and the next counts. If a count falls by at least this motion, and is then near
+zero, the board has obeyed the reset."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""Together, the smallest count that proves a reset of a robot at rest, if both counts are zero
-afterwards. Backlash of the gears can cause smaller changes."""
+"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count before a reset
+that proves the reset of a robot at rest, if both counts are zero afterwards. Backlash of the gears
+can cause smaller changes."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""
@@ -48,8 +51,8 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the reset is repeated, with the counts ``before`` this repetition.
 
-        The new counts replace the earlier counts if the new counts can prove the reset: if they are
-        not near zero, and the wheels are at rest.
+        The new counts replace the earlier counts only if the new counts can prove the reset. They
+        can prove it if they are not near zero, and the wheels are at rest.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

@@ -40,9 +40,9 @@ class Done:
 
     ``lasted_s``: time in s from the request to the reply.
 
-    ``quiet_s``: longest time in s for which the second run may have lasted.
+    ``quiet_s``: longest possible duration of a second run, in s.
 
-    ``completed``: whether the move ended by itself with a success, without a stop.
+    ``completed``: whether the server reported success, and no stop ended the move.
 
     ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
 
@@ -76,7 +76,7 @@ class Done:
 
     @property
     def is_large(self) -> bool:
-        """Whether the encoder count can show that a run was not complete."""
+        """Whether the move is so large that the encoder count can show an incomplete run."""
         return self.asked >= self._least
 
     @property
@@ -110,8 +110,9 @@ class Done:
     def contradicts_the_server(self) -> bool:
         """Whether the encoder contradicts the server, which has reported a completed turn.
 
-        The right wheel has then turned much less or much more than the turn requires. The server
-        ends a turn by the gyro, so it may not notice a wheel that is stuck or slips.
+        The encoder contradicts the server if the right wheel has turned much less or much more than
+        the turn requires. The server ends a turn by the gyro, so it may not notice a wheel that is
+        stuck or slips.
         """
         if self.is_straight or not self.completed or not self.is_large:
             return False
@@ -127,7 +128,10 @@ class Done:
 
     @property
     def has_run_twice(self) -> bool:
-        """Whether the first run was complete, and the driver has stopped a second run."""
+        """Whether the server has run the move twice.
+
+        The first run was complete. The driver has stopped the second run.
+        """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
 
@@ -135,8 +139,9 @@ class Done:
     def ended_late(self) -> bool:
         """Whether the reply came so late that the move may have run twice.
 
-        The network can duplicate the request of a move. The reply may then belong to the second
-        run, and the reply to the first run was lost.
+        If the network has duplicated the request, the server runs the move twice. The reply may
+        then be the answer to the second run, because the network has lost the answer to the first
+        run.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -144,7 +149,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        The reply then belongs to another request. If the driver then sent a stop to end a possible
-        second run, this stop has ended the first run.
+        Such a reply belongs to another request. After this reply, the driver may have sent a stop
+        to end a possible second run. If so, this stop has in fact ended the first run.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The base of the pilot: what it knows about server and robot, and how it sends commands.
+"""The base of the pilot: it stores the state of server and robot, and sends commands.
 
 This module knows states and commands; it does not know why a command is sent. The caller passes the
 time.
@@ -51,8 +51,8 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 The silence is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
-"""Largest number of HELLO queries whose answers the driver still expects. If more queries are
-unanswered, it expects answers to the last ones only."""
+"""Largest number of unanswered HELLO queries for which the driver still expects answers. If more
+queries are unanswered, it expects answers to the newest ones only."""
 HEADING_S, HEADING_TRIPS = 1.0, 5
 NO_HEADING: Final = (
     "the server does not report the relative heading (RMRA) of the robot at rest, so the heading of"
@@ -181,9 +181,10 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that is in progress, or that may run a second time.
+        """Start time of a controlled move that is in progress, or that the server may run twice.
 
-        None if there is no such move. During a controlled move, the server reports no measurements.
+        None if there is no such move. During a controlled move, the server reports no measurements,
+        so the driver is blind.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
@@ -212,16 +213,16 @@ class Ground:
     def _seems_present(self) -> bool:
         """Whether replies show that the server was not restarted since the last start command.
 
-        They show this if no silence between them was long enough for a restart.
+        The replies show this if each silence between two of them was too short for a restart.
         """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
 
     def _hears(self, now: float) -> None:
-        """Record the arrival of a reply.
+        """Record the arrival of a reply. Decide whether the server may have been restarted.
 
-        A new server may have been started if there was a long silence before this reply, or if
-        another kind of server has answered until now.
+        A restart before this reply is possible if there was a long silence before it, or if the
+        previous replies came from another kind of server.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
@@ -275,10 +276,12 @@ class Ground:
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        It must wait after a forward drive (RM). For the odometry, the first encoder count at rest
-        ends the drive. Before this count, the odometry needs a heading that was measured at rest.
-        The driver waits for at most HEADING_S, plus HEADING_TRIPS times the duration of a query.
-        Then it logs NO_HEADING once.
+        The driver must wait only after a forward drive (RM). The first encoder count at rest ends
+        the drive in the odometry. The odometry then needs a heading that was measured at rest, so
+        the heading must come before this count.
+
+        The driver waits for at most HEADING_S, plus HEADING_TRIPS times the duration of a query. If
+        no heading has come by then, it logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

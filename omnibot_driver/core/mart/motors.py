@@ -2,9 +2,9 @@
 
 """What the driver has learned about the two motors: how their speeds depend on the motor units.
 
-A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. Its speeds are in nominal
-units: at 10 motor units, an ideal motor has the speed 10. This module knows units,
-m/s and rad/s; it does not know what is commanded.
+A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. The speeds of a
+``MotorLine`` are in nominal units: at 10 motor units, an ideal motor has the speed 10. This module
+knows units, m/s and rad/s; it does not know what is commanded.
 """
 
 import copy
@@ -24,15 +24,15 @@ Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Smallest number of motor units for which the ratio of the two motors' speeds is computed.
 
-For fewer units, the ratio for this number is used: at low speeds, an error of a ``MotorLine`` would
-change the ratio too much.
+For fewer units, the driver uses the ratio at ``BALANCE_UNITS``. At low speeds, an error of a
+``MotorLine`` would change the ratio too much.
 """
 
 
 class Motors:
     """The right and the left motor.
 
-    ``volts``: battery voltage as last reported, in V.
+    ``volts``: the battery voltage that the server last reported, in V.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -65,8 +65,8 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
-        ``seen_radps``: the measured rate of the current turn, which uses ``units``. It changes
-        only the result of this method; ``spun`` learns from measured rates.
+        ``seen_radps``: the measured rate of the current turn, which uses ``units``. This method
+        does not store what ``seen_radps`` shows; the method ``spun`` does this.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
@@ -95,10 +95,10 @@ class Motors:
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
-        """Return the ratio of the motors' speeds (left / right) if both motors have ``units``.
+        """Return the ratio of the motors' speeds (left / right) if each motor has ``units``.
 
-        If the network loses or duplicates a request to change the speed, the driver can learn a
-        wrong ``MotorLine``. So the ratio is limited to ``motor_balance`` ± MOST_UNEQUAL.
+        The ratio is limited to ``motor_balance`` ± MOST_UNEQUAL, because a ``MotorLine`` can be
+        wrong. The reason: the network may have lost or duplicated a request to change the speed.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))

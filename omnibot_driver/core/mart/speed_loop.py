@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The control of both motors: which command units give the wanted speed and turn rate.
+"""The control of both motors: it computes the motor units for a wanted speed and turn rate.
 
 The integral of the turn rate's error holds the heading. This module knows units, m/s and rad; it
 does not know commands. The caller passes the time.
@@ -23,25 +23,28 @@ It is small, because the network may duplicate a command, which then acts twice.
 MOST_BACKWARD: Final = 5
 """Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-In a backward drive, the driver does not notice a command that arrives twice.
+A slow network may deliver a command twice. In a backward drive, the driver does not notice this.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
 
-``SETTLE_S``: time after a large change of units. ``LEARN_S``: shortest averaging window.
+``SETTLE_S``: time after a large change of units in which the driver does not learn.
+
+``LEARN_S``: shortest averaging window.
 """
 LARGE_UNITS: Final = 3
 MOST_MISSED: Final = 4
 """Largest number of unanswered changes of the units that the driver examines together.
 
-The measured speeds show which of these changes have arrived at the server.
+From the measured speeds, the driver finds out which of these changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Effect of slow exchanges with the server on what the driver learns about the motors.
+"""How slow exchanges with the server change what the driver learns about the motors.
 
-``LEARN_TRIPS``: the averaging window is longer by the duration of this number of exchanges.
+``LEARN_TRIPS``: the averaging window is LEARN_S, plus the duration of this number of exchanges.
 
-``LESS_PER_S``: relative growth of a speed's standard deviation, per second that an exchange takes.
+``LESS_PER_S``: relative growth of a measured speed's standard deviation, for each second that an
+exchange takes.
 """
 SLOWEST_MPS: Final = 0.015
 """Measured wheel speed in m/s above which a wheel is regarded as turning."""
@@ -54,7 +57,8 @@ LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the units of the next RM (forward) grow after a start that turned no motor.
 
-The new units are at most MOST_DEAD, unless RM needs more for the commanded speed.
+These larger units are at most MOST_DEAD. If the commanded speed needs more than MOST_DEAD, RM uses
+what the speed needs.
 """
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
@@ -100,8 +104,9 @@ class SpeedLoop(Motors):
 
     ``trip_s``: average duration of an exchange, in s.
 
-    ``part``: how much the last command changed the motors' units. For each motor, the change
-    without sign is divided by the motor's previous units; the two quotients are added.
+    ``part``: relative size of the last change of the motors' units: the sum of both motors'
+    relative changes. A motor's relative change is the change without sign, divided by the motor's
+    previous units.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -128,8 +133,8 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors, at most 60.
 
-        These are the units for the speed of the slower wheel. The result is larger if an earlier
-        start turned no motor.
+        The slower wheel's speed needs this number of units. If an earlier start turned no motor,
+        the number is larger.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -156,22 +161,23 @@ class SpeedLoop(Motors):
 
     @property
     def units(self) -> int:
-        """Motor units (0 to 127) of the motor that has more of them."""
+        """The larger one of the two motors' units, 0 to 127."""
         return max(self._right.units, self._left.units)
 
     @property
     def blocked_s(self) -> float:
         """Time in s for which a wheel has not turned although its motor has enough units.
 
-        Of the times of both wheels, the longer one.
+        If both wheels have not turned, the result is the longer one of their times.
         """
         return max(self._right.stood_s, self._left.stood_s)
 
     @property
     def left_over_right(self) -> float:
-        """Expected ratio of left to right wheel speed, from the units and the learned lines.
+        """Expected ratio of left to right wheel speed.
 
-        If both sides have equal units, the ratio is ``balance``.
+        It is computed from the current units, and from the two motor lines that the driver has
+        learned. If both sides have equal units, the ratio is ``balance``.
         """
         right, left = self._right, self._left
         if not right.units:
@@ -211,8 +217,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Learn from a displacement measured over ``seconds``, and update the heading error.
 
-        ``right_only``: whether only the right wheel was measured. What is learned about the right
-        motor then also changes the left motor's line.
+        ``right_only``: whether only the right wheel was measured. In this case, the left motor's
+        line changes by the same amounts as the right motor's line.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
@@ -240,10 +246,11 @@ class SpeedLoop(Motors):
             self._clear(now)
 
     def _judge_missed(self, *, right_only: bool) -> None:
-        """Undo those unanswered changes of the units that have not arrived at the server.
+        """Undo the unanswered changes of the units that have not arrived at the server.
 
-        Any of these changes may be missing at the server. The driver tries all combinations, and
-        assumes the one whose units fit the measured speeds best.
+        The server has answered none of the changes in ``_missed``, so each may have arrived or not.
+        The driver tries all combinations of arrived and lost changes. It assumes the combination
+        whose units fit the measured speeds best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:

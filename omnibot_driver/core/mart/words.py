@@ -13,7 +13,8 @@ from typing import Final
 COMMAND, STOP = 0, 1
 """The channels: the command port P, and the stop port P+1, which never answers."""
 LONGEST_REQUEST: Final = 49
-"""Longest request in bytes. The shortest has 1 byte: an empty datagram shuts the server down."""
+"""Longest request in bytes. The shortest request has 1 byte, because an empty datagram shuts the
+server down."""
 
 
 class Form(Enum):
@@ -188,7 +189,7 @@ NEVER_SAID: Final = {
     "F": "RM drives forward as well, and can turn",
     "SDR": "limits a move that has no distance; the driver never starts such a move",
     "TFSFC": "undocumented; changes the distance from an obstacle at which the robot stops",
-    "MNLV": "undocumented; reports a speed from calibration files; the encoder measures it better",
+    "MNLV": "undocumented; reports a speed from calibration files; the encoder gives a better one",
     "MD": "undocumented; reports a distance that the server computes from time",
     "MCF": "undocumented; like the command TF, but does not check the clearance",
     "MCB": "undocumented; like the command TB",

@@ -58,8 +58,8 @@ class Walk:
     * ``ends``: the position in the bytes after each frame.
     * ``lessons``: IMU frames from which the usual scatter is learned. Each entry: number of frames
       before the IMU frame, the IMU frame itself, and the previous IMU frame.
-    * ``known``: what was known at some places. Each entry: number of frames before the place, and
-      the fields of ``Context`` there.
+    * ``known``: what was known before some of the frames. Each entry: number of frames before this
+      point, and the fields of ``Context`` at this point.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -93,11 +93,13 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Return whether a frame begins at ``at``, the end of a frame with odd content.
+    """Return whether a frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, the odd content is from a shock, not from damage. If the bytes after the frame at ``at``
-    cannot begin another frame, the result is False. If ``at`` is the end of ``held``, the result is
-    ``closed``: whether no more bytes come.
+    If a frame begins there, the unusual content comes from a shock of the robot, not from damage.
+    The result is False if the bytes after the frame at ``at`` cannot begin another frame.
+
+    ``closed``: whether no more bytes come. If ``at`` is the end of ``held``, the result is
+    ``closed``.
     """
     if at == len(held):
         return closed
@@ -116,10 +118,10 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Add the expected frames from ``at`` on to ``walk``; return where they end.
+    """Add the expected frames from ``at`` on to ``walk``.
 
-    Also return what is known after them. The last frame is omitted if its last byte may belong to
-    the next header.
+    Return the end of the last added frame, and what is known after this frame. The last expected
+    frame is not added if its last byte may belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

@@ -3,8 +3,8 @@
 """The order in which a running board sends frames, and an estimate of the frames that were lost.
 
 At 25 Hz, the board sends a delta after every fourth IMU frame, and a pose after every fifth delta.
-So the number of discarded bytes shows which frames were lost. This is only an estimate; the
-counters in the frames and the arrival times correct it.
+Discarded bytes are assumed to be the next frames in this order, so their number shows which frames
+were lost. This is only an estimate; the counters in the frames and the arrival times correct it.
 """
 
 from functools import cache
@@ -22,7 +22,8 @@ class Cycle:
     """A repeating sequence of frame kinds.
 
     ``after[kind][at]``: the new position in the sequence when a frame of ``kind`` arrives at the
-    position ``at``. It is the position after the next frame of ``kind`` in the sequence.
+    position ``at``. If the sequence has another kind at ``at``, the positions up to the next
+    ``kind`` are skipped.
     """
 
     def __init__(self, *kinds: Kind) -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Checks for settings that the board's data contradicts. The user is advised to change them.
+"""Checks for settings that the board's data contradicts, with advice to change these settings.
 
 This module knows what the data means under each setting; it does not know how the user is informed.
 """
@@ -40,9 +40,9 @@ FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
 """Limits for the advice to change the setting of the period of the deltas.
 
-``FEWEST_DELTAS``: number of consecutive deltas that must show the same other period.
-
-``FOR_S``: time in s for which they must show it.
+The advice is given if the deltas show another period than the setting. ``FEWEST_DELTAS``: number of
+consecutive deltas that must show the same other period. ``FOR_S``: time in s for which the deltas
+must show this period.
 """
 RATE_TOLERANCE: Final = 0.1
 

@@ -41,30 +41,31 @@ The board sends one text a second, and answers a reset within 9 s. So if the cou
 that more texts were lost, the board has restarted.
 """
 FULL: Final = 4000
-"""If this many bytes are decoded after one read, the kernel's buffer of 4 KiB may have been full.
+"""Number of bytes from which on the kernel's buffer of 4 KiB is regarded as full before a read.
 
-The number is below 4096, because the decoder may keep some bytes of a read for later.
+The bytes are those that are decoded after one read. The number is below 4096, because the decoder
+may keep some bytes of a read for later.
 """
 BEHIND_S: Final = 0.5
-"""If a read is late by more than this time, in s, the driver checks whether the next read is late.
+"""Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
 The next read is regarded as late if the board needed more time to send its bytes than ``BURST_S``
 plus twice the time between the two reads.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
-"""Shortest delay of a read, in s, for which arrival times are corrected. An inaccurate clock of the
-board can look like a shorter delay."""
+"""Shortest delay of a read, in s, for which the driver corrects arrival times. A shorter delay may
+only seem to be there, because the board's clock is inaccurate."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
 
 class Translation:
-    """Translates the frames of one line, and infers the board's mode and wrong settings from them.
+    """Translates the frames of one line. Infers the board's mode and wrong settings from them.
 
     * ``settings``: may be replaced, except ``delta_period_s``.
-    * ``singles_to_come``: number of IMU frames that the fast path ``single_imu`` may still decode
-      without this class.
+    * ``singles_to_come``: how many more IMU frames the fast path ``single_imu`` may decode without
+      this class.
     * ``heard_s``: arrival time in s of the last decoded bytes.
     """
 
@@ -83,7 +84,8 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """``_most_singles``: value of ``singles_to_come`` before the fast path decoded a frame."""
+        """``_most_singles``: first value of ``singles_to_come``. The fast path counts
+        ``singles_to_come`` down when it decodes a frame; ``_most_singles`` does not change."""
         self.heard_s = -math.inf
         self._behind_s = 0.0
         """Time in s from the sending of the last byte to the read that returned it."""
@@ -115,10 +117,11 @@ class Translation:
     def _sent_s(self, count: int, now: float) -> float:
         """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
-        If the read was not late, return ``now``. Before a late read, the kernel's buffer may have
-        become full. A full buffer keeps its bytes and loses the bytes that come later. So the board
-        has sent the bytes of the late read directly after those of the previous read. The driver
-        may need several reads to empty the buffer.
+        If the read was not late, return ``now``. While the driver was late, the kernel's buffer may
+        have become full. A full buffer keeps its bytes and loses all bytes that come later. So
+        there is no gap within the bytes in the buffer: the board sent the bytes of this read
+        directly after the bytes of the previous read. This is also true if the driver needs several
+        reads to empty the buffer.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S

@@ -41,5 +41,5 @@ class ArrivalClock:
         return stamps
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of one reading in s, as ``stamps`` does."""
+        """Return the stamp of one reading in s, later than the stamp before it."""
         return self.stamps((reading,), now, edge)[0]

@@ -36,7 +36,7 @@ class RunningBoard(ABC, Generic[B]):
     ``dropped``: number of bytes that were lost at the port, because the driver did not read them in
     time or its UDP address is unknown.
 
-    ``board``: other threads must hold ``lock`` while they use the board.
+    ``board``: the simulated board. Other threads must hold ``lock`` while they use it.
 
     ``stop``, ``check`` and ``wait_for`` raise RuntimeError if the thread has died.
     """
@@ -61,7 +61,7 @@ class RunningBoard(ABC, Generic[B]):
 
     @property
     def facts(self) -> dict[str, object]:
-        """The board's facts, and the numbers of dropped bytes and of faults of the lines.
+        """``board.facts``, the number of dropped bytes, and the number of each fault of the lines.
 
         The caller must hold ``lock``.
         """

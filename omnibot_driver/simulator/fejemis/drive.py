@@ -191,7 +191,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     def velocity(self) -> tuple[float, float]:
         """Return the speeds of the left and the right wheel in m/s.
 
-        They are not quantised: the firmware measures the time between two ticks.
+        The firmware computes them from the time between two ticks, so they are not quantised.
         """
         (left, right), (left_m, right_m) = self.vehicle.radps, self.config.radii_m
         return left * left_m, right * right_m

@@ -45,9 +45,9 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Return the result of the check, the line without ``;NN``, and its correct checksum.
+    """Check a line; return the result, the line without ``;NN``, and its correct checksum.
 
-    If the line has no ``;NN``, the last value is 0.
+    If the line has no ``;NN``, the third value is 0.
     """
     found = _PREFIX.match(text)
     if found is None:

@@ -45,7 +45,7 @@ class Uart:
 
     @property
     def deaf(self) -> bool:
-        """Whether interrupts are off while the current data is sent."""
+        """Whether the board sends the current data with interrupts off, and may lose input."""
         return bool(self._sending) and self._sending[0][1]
 
     def receive(self, data: bytes) -> None:

@@ -58,7 +58,8 @@ class Motion:
 
     watching: whether the module ``alarms`` supervises the motion.
 
-    posts: number of notices that this motion has started or ended, and that no port has taken yet.
+    posts: number of notices that the method ``wait`` of the server has not taken yet. A notice says
+    that a motion of this kind has started or ended.
 
     right, left: motor registers, as the server knows them.
 

@@ -53,8 +53,8 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Both are converted to one effort for each wheel, as a velocity is converted to wheel speeds. The
-    efforts are added to those of the motors.
+    Force and torque are converted to one effort for each wheel, in the same way as a velocity is
+    converted to wheel speeds. These efforts are added to the motors' efforts.
     """
 
     x_pwm: float = 0.0
@@ -176,9 +176,10 @@ class World:
         return a * (1 - a_slip), b * (1 - b_slip), c * (1 - c_slip)
 
     def _wander(self, slip: float, rim_m: float) -> float:
-        """Return the wheel's slip after ``rim_m`` of rim motion, from 0 to 1.
+        """Return the wheel's slip, from 0 to 1, after its rim has moved by ``rim_m``.
 
-        The slip varies at random. Its standard deviation is half the mean slip.
+        ``slip``: the slip before this motion. The slip varies at random about the mean slip, with a
+        standard deviation of half the mean slip.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)

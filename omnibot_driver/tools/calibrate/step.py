@@ -79,9 +79,9 @@ def _record(
 def _to_and_fro(
     levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
 ) -> tuple[Law, float]:
-    """Return a law that alternates between the slow and the fast speed, and its duration in s.
+    """Return a control law that alternates between slow and fast speed, and its duration in s.
 
-    Each step begins at another time within the period of the odometry deltas. So the deltas of all
+    Each step begins at a different phase of the period of the odometry deltas. So the deltas of all
     steps together show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []

@@ -37,7 +37,7 @@ class Model:
 
     ``start``, ``low``, ``high``: starting values and bounds of the parameters.
 
-    ``turned``: returns the angle turned after a step of the rate to 1 rad/s.
+    ``turned``: the function ``Turned`` of this model.
     """
 
     title: str
@@ -88,8 +88,8 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 def motor_in_loop(gains: Gains) -> Turned:
     """Return a function: the step response of a motor in the manual's control loop.
 
-    The function's parameters are the motor's PWM steps per (count per tick), its time constant in
-    s, and its delay in s.
+    The function has three parameters of the motor: the PWM steps for a speed of one count per tick,
+    the time constant in s, and the delay in s.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

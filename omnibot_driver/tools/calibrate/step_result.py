@@ -20,8 +20,8 @@ The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 MANY: Final = 1.5
 """Ratio of the residuals to the quantisation error above which the tool warns.
 
-A possible cause of large residuals is that commands were delayed. The residuals are then twice as
-large, and the delay that the tool finds for the wheel is 4 ms too long.
+A possible cause of large residuals is that commands were delayed. Delayed commands make the
+residuals twice as large. They also make the delay that the tool finds for the wheel 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.

@@ -67,7 +67,8 @@ class PlantFit:
     marks: Marks | None = None
     """Distances between the encoder's marks; None if the marks are assumed to be evenly spaced.
 
-    They are, if the errors of the times between ticks have no pattern that repeats with each turn.
+    The tool assumes this if the errors of the times between ticks have no pattern that repeats with
+    each turn.
     """
 
     @property

@@ -25,9 +25,9 @@ UNLIKE: Final = 1.5
 A larger factor shows that the board missed an edge of the encoder's signal or noticed it late.
 """
 SMOOTHED: Final = 4
-"""Number of successive times between ticks from which one speed is computed, by their sum.
+"""Number of successive times between ticks from whose sum one speed is computed.
 
-A displaced mark changes this sum only if the sum begins or ends at the mark.
+If a mark of the encoder is displaced, the sum changes only if it begins or ends at this mark.
 """
 
 

@@ -13,7 +13,7 @@ PROOF: Final = ("imu/data_raw", "odom", "state")
 """Topics that identify a robot. A namespace with at least one of them belongs to a robot."""
 
 Topics = dict[str, str]
-"""For each topic of a robot: its role, such as ``odom`` or ``state``."""
+"""The topics of one robot. The key is the topic's name, the value its role, such as ``odom``."""
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
@@ -38,9 +38,9 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """Return the possible roles of this topic, according to its name.
 
-    The value of each role is a pair: the robot's namespace, and whether type and node fit the role.
-    The type fits if ``kind`` is a message type of the role. The node matters only for a role such
-    as ``state``: the topic must belong to a node in ``drivers``.
+    The key is the role. The value is a pair: the robot's namespace, and whether the topic fits the
+    role. It fits if ``kind`` is a message type of the role. For a role such as ``state``, a node in
+    ``drivers`` must also have this topic in its own namespace.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
