@@ -25,7 +25,7 @@ def test_a_pseudo_terminal_counts_no_overruns() -> None:
 def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
     """The number of overruns is the sum of two numbers that the kernel gives.
 
-    In ``serial_icounter_struct`` of linux/serial.h, they are the eighth and the eleventh.
+    These are the eighth and the eleventh number in ``serial_icounter_struct`` of linux/serial.h.
     """
 
     def ioctl(_descriptor: int, request: int, _data: bytes) -> bytes:

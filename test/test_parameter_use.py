@@ -96,14 +96,15 @@ def test_every_parameter_is_read(board: str) -> None:
 
 
 UNLIKE_THE_ROW = {"mart": {"speed_per_unit"}, "fejemis": {"wheelbase_m"}}
-"""Fields of a board's settings whose default is not that of the parameter."""
+"""For each board: the fields of its settings whose default differs from the parameter's default."""
 
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_the_settings_have_the_defaults_of_the_parameters(board: str) -> None:
     """The defaults of a board's settings are those of the parameters.
 
-    The test also fails if ``settings`` does not fill a field, or exchanges two fields.
+    The test makes settings from the parameters' defaults. So it also fails if ``settings`` leaves a
+    field out, or exchanges two fields.
     """
     settings = boards.load(board).settings(boards.check_all({"board": board}))
     defaults = type(settings)()

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays with more tasks than the floor and fewer than the driver: each step adds one task.
+"""Relays of a board's data. Each step is a relay with one more task than the step before.
 
-The floor is the smallest program with the same output as the driver, without any checks.
+The floor is the smallest program with the same output as the driver, without any checks. Each relay
+has more tasks than the floor, and fewer than the driver.
 
 Arguments: the step (a key of STEPS), the port, the namespace. The relay writes nothing to the port.
 """
@@ -40,7 +41,10 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 
 
 class Relay:
-    """A relay with one method for each step. It publishes messages from the bytes of one read."""
+    """A relay that publishes messages from the bytes of one read.
+
+    Each step of ``STEPS`` uses one of the methods that take the bytes.
+    """
 
     def __init__(self, node: Node) -> None:
         values = boards.check_all({})

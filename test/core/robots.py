@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Benches with a robot at the beginning of a test: at rest, paused or driving."""
+"""Benches for the beginning of a test: the robot is at rest or drives, or the board is paused."""
 
 from session_bench import Bench
 

@@ -168,10 +168,10 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """Deltas are in wheel counts. All three wheels turn backward by 1/8 of a turn.
+    """Deltas in wheel counts are converted to the motion of the robot.
 
-    The robot has then turned left in place. Next, wheel B turns forward and wheel A backward, and
-    the robot drives straight ahead.
+    All three wheels turn backward by 1/8 of a turn: the robot turns left in place. Next, wheel B
+    turns forward and wheel A backward: the robot drives straight ahead.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

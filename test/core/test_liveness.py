@@ -78,10 +78,10 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """The driver wakes at the first limit for a silence of the board.
+    """The driver must wake when the next limit for a silence of the board is reached.
 
-    If the robot is driven, this limit is 0.5 s: the driver then ends the command. If the robot is
-    not driven, this limit is 2 s: the driver then regards the board as silent.
+    While the robot is driven, this limit is 0.5 s: the driver then ends the command. While the
+    robot is not driven, the limit is 2 s: the driver then regards the board as silent.
     """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5

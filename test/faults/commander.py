@@ -82,6 +82,6 @@ class Navigator:
         self._goals.publish(goal)
 
     def leave(self) -> None:
-        """Latch and release the e-stop, to discard the goal. A goal has no timeout."""
+        """Latch and release the e-stop. This discards the goal, which has no timeout."""
         for data in (True, False):
             self._probe.call(SetBool, "estop", data=data)

@@ -14,7 +14,7 @@ from walk import CALLS, steps_of
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
     """Every board has at least one fault that the campaign injects.
 
-    ``without`` names what the campaign leaves out for the board. Each of these names exists, as a
+    The board's ``without`` names what the campaign leaves out. Each of these names exists, as a
     fault or as a part of the campaign.
     """
     kind = load(board)
@@ -32,7 +32,7 @@ def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> N
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_a_random_walk_calls_only_services_that_the_board_has(board: str) -> None:
-    """The campaign's random walk with a board has faults, and calls only the board's services."""
+    """The campaign's random walk injects faults, and calls only services that the board has."""
     kind = load(board)
     steps = steps_of(kind)
     assert {CALLS[name] for name in steps if name in CALLS} == kind.services & {*CALLS.values()}

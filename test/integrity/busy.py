@@ -27,9 +27,11 @@ READ_S = 20e-6
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
 """Share of the wake-ups that busy loops delay, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of the wake-ups after which busy loops slow the process down for a while.
+"""How often and how long busy loops slow the process down.
 
-``BEHIND_FOR_S``: the range of the duration of this slowdown, in s.
+``BEHIND_SHARE``: share of the wake-ups with which such a slow period begins.
+
+``BEHIND_FOR_S``: the range of the duration of a slow period, in s.
 """
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """Ranges of the delay of a wake-up in a slowed process, in s.
@@ -137,9 +139,10 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Deliver pieces whose kind changes at random: single bytes, a few bytes, bursts or packets.
+    """Deliver pieces of changing kinds to a late reader.
 
-    A late reader reads all bytes that have arrived, or some of them.
+    The kind changes at random: single bytes, a few bytes, bursts or packets. In each read, the late
+    reader takes all bytes that have arrived, or some of them.
     """
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []

@@ -31,8 +31,8 @@ PERIODS_S = 0.04, 0.1
 def robot(**settings: object) -> Callable[[float], Bench]:
     """Return a function that makes a test bench: a driver's session and a robot at rest.
 
-    ``settings``: settings of the robot. The function's argument is the period of the displacements,
-    in s.
+    ``settings``: settings of the robot. The returned function has one argument: the period of the
+    displacements, in s.
     """
     return lambda period_s: started(
         BoardSettings(running=True, delta_period_s=period_s, **settings)  # type: ignore[arg-type]
@@ -67,7 +67,8 @@ def row(
 ) -> None:
     """Print a row of the table: the shortest and the longest reaction time.
 
-    The motion begins at each possible tick between two displacements, in one trial each.
+    The function measures one reaction time for each tick of the period between two displacements.
+    The motion begins at this tick.
     """
     shown = []
     for period_s in PERIODS_S:
@@ -85,7 +86,7 @@ def row(
 def main() -> None:
     print("| the robot | commanded | stopped after | with `delta_period: 0.1` |\n|---|---|---|---|")
     row(
-        "the board's switch is on position, 3 m from its origin",
+        "has its switch on position control, 3 m from its origin",
         SLOWLY,
         lambda bench: stopped_after_s(bench, SLOWLY),
         lambda period_s: on_the_wrong_switch("earth", period_s),

@@ -3,8 +3,8 @@
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
 The simulated board shares no code with the driver. The decoded reports are compared with the true
-reports, in order. A decoded report is right if a true report equals it. This true report must come
-after the one that the previous right report equals.
+reports. A decoded report is right if it equals a true report, and if right reports have the order
+of the true reports.
 """
 
 from collections import Counter
@@ -30,7 +30,7 @@ No decoded report may be wrong.
 """
 
 Stream = list[bytes]
-"""The bytes of each tick."""
+"""The bytes that the board sends, with one entry for each tick."""
 
 
 @dataclass(slots=True)

@@ -80,7 +80,7 @@ class Score:
         return self
 
     def count(self, kind: str, wrong: bool) -> None:
-        """Count one published message of this kind, and whether it is wrong."""
+        """Count one published message of ``kind``. ``wrong``: whether its value is wrong."""
         self.published[kind] += 1
         self.wrong[kind] += wrong
 
@@ -119,8 +119,8 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 def _watch(bench: MartBench, score: Score) -> None:
     """Run for 0.1 s, and count right and wrong messages.
 
-    Odometry is compared with the truth at its publication, other messages with the truth at the end
-    of the 0.1 s.
+    Odometry is compared with the robot's true pose at the time of publication. All other messages
+    are compared with the true values at the end of the 0.1 s.
     """
     seen = len(bench.events)
     for _ in range(10):

@@ -2,8 +2,9 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: first seed. The
-decoder was tuned with seeds from 1000 on. The exit code is 1 when a bound is missed.
+``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: first seed. Use seeds
+below 1000, because the decoder was tuned with seeds from 1000 on. The exit code is 1 when a bound
+is missed.
 """
 
 import argparse
@@ -43,7 +44,7 @@ def rate(score: Score) -> str:
 
 
 def bound_of(fault: str, chunker: str) -> str:
-    """Return the limits of this fault and chunking as text."""
+    """Return, as text, the bounds for wrong and delivered frames with this fault and chunking."""
     bound = BOUNDS[fault]
     if chunker not in bound.chunkers:
         return "none"
@@ -84,7 +85,7 @@ def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:
         totals = [over_chunkers(ours, fault, scenario) for scenario in SCENARIOS]
         cells = [f"{rate(total)}; {total.delivered_share:.2%}" for total in totals]
         lines.append(f"| {fault} | " + " | ".join(cells) + " |")
-    lines += ["", "Delivered share of the texts of a paused board that arrived intact:", ""]
+    lines += ["", "Texts of a paused board that arrived intact, and their delivered share:", ""]
     lines += ["| fault | texts delivered |", "|---|---|"]
     for fault in FAULTS:
         total = over_chunkers(ours, fault, WITH_TEXTS)

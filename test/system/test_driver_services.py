@@ -58,9 +58,9 @@ def drive(probe: Probe, board: PtyBoard) -> None:
 
 
 def drive_away(probe: Probe, board: PtyBoard) -> None:
-    """Drive forward and stop. Repeat this until the robot is more than 0.1 m away.
+    """Drive forward and stop, until the robot is more than 0.1 m away.
 
-    On a busy computer the robot may stop early.
+    More than one drive may be necessary, because the robot may stop early on a busy computer.
     """
     for _ in range(20):
         drive(probe, board)

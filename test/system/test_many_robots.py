@@ -19,7 +19,10 @@ from std_srvs.srv import SetBool
 
 @dataclass
 class Robot:
-    """A driver on its own simulated board, with the messages that its probe has received."""
+    """A driver on its own simulated board, and the messages that it has published.
+
+    ``probe``: the node that has received these messages.
+    """
 
     name: str
     probe: Probe

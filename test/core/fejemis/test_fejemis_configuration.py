@@ -159,10 +159,10 @@ def test_a_small_change_by_the_user_is_written() -> None:
 
 @pytest.mark.slow
 def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
-    """The user changes a radius by 0.3 mm, and the line that writes it is damaged on its way.
+    """The user changes a radius by 0.3 mm. The text line that writes it is damaged on its way.
 
-    The board then reports the old radius, with four decimals. These are enough to show that it is
-    not the new radius, so the driver writes the new radius again.
+    The board then reports the old radius, with four decimals. Four decimals are enough to show that
+    the board does not have the new radius, so the driver writes it again.
     """
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
@@ -278,10 +278,10 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """The line that writes a setting is lost. Motion is refused until the board has the setting.
+    """A text line that writes a setting is lost. Motion is refused until the board has the setting.
 
-    Otherwise, the board could drive without the setting: while the robot is driven, the driver does
-    not repeat the line.
+    The driver does not repeat this line while the robot is driven. So without the refusal, the
+    board could drive without the setting.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

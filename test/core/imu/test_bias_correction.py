@@ -243,9 +243,9 @@ def test_the_figures_count_what_happened() -> None:
 
 
 def test_a_calibration_ends_when_the_estop_is_latched() -> None:
-    """Somebody latches the e-stop during a calibration, which then fails.
+    """Somebody latches the e-stop during a calibration. This calibration fails.
 
-    A calibration that is called while the e-stop is latched succeeds.
+    A new calibration is called while the e-stop is still latched. It succeeds.
     """
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)

@@ -22,7 +22,10 @@ FIRMWARE = pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "
 
 
 def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
-    """Decode the pieces. Return all reports, even those completed by a silence, and the decoder."""
+    """Decode the pieces, and return all reports and the decoder.
+
+    Some reports are complete only when no more data comes for a while. They are included.
+    """
     decoder, found = LoisDecoder(), list[Report]()
     for at, data in given:
         if decoder.resolves_at <= at:

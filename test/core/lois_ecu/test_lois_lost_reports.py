@@ -76,7 +76,8 @@ def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: floa
 def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
     """The line is interrupted in both directions. Meanwhile, the user commands a stop.
 
-    The stop does not arrive, so the robot drives on. The covariance includes the distance.
+    The stop does not arrive, so the robot drives on. The covariance includes the distance that the
+    robot drives after the lost stop.
     """
     rig = Rig(nominal("firmware"), HOST_GAINS)
     rig.run(4.0)
@@ -92,7 +93,8 @@ def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports
     """Most reports are lost. All reports that arrive have the same speed of the right wheel.
 
     The board repeats the last speed of a wheel at rest. So the right wheel may be at rest, and the
-    estimated heading may be wrong. Its standard deviation is at least half of this error.
+    estimated heading may be wrong. The standard deviation of the heading is at least half of this
+    possible error.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -110,10 +112,11 @@ def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports
 def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
     right_rpms: tuple[int, ...], more_deg: float
 ) -> None:
-    """In a drive backward, reports are lost for 0.9 s. The wheels may then change their speeds.
+    """In a drive backward, reports are lost for 0.9 s.
 
-    So the standard deviation of the heading grows more than without this gap. It grows even more if
-    the speed of a wheel has swung before the gap.
+    In this time, the wheels may change their speeds. So the standard deviation of the heading grows
+    more than without this gap. It grows even more if the speed of a wheel went up and down before
+    the gap.
     """
 
     def grown_deg(gap_s: float) -> float:

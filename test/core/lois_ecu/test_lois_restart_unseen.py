@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of restarts that are hard to see, on a board as in the manual.
+"""Tests of restarts that are hard to see, on a board that follows the manual.
 
-Its clock counts ns and wraps every 4.3 s. After a restart, clock and tick counts begin at zero.
+The board's clock counts ns and wraps every 4.3 s. After a restart, clock and tick counts begin at
+zero.
 """
 
 import math
@@ -63,8 +64,9 @@ def test_a_restart_shows_although_the_clock_wraps_at_that_time(
 ) -> None:
     """The board restarts shortly after its clock wrapped, or shortly before it would wrap.
 
-    The clock begins at zero after the restart. Without the restart, it would be near zero too. The
-    driver still notices the restart, and the odometry does not jump back by the lost counts.
+    After the restart, the clock begins at zero. Without the restart, the clock would be near zero
+    too. The driver still notices the restart. So the odometry does not take the lost tick counts
+    for a motion backward.
     """
     bench = Bench("documented")
     begin_drive(bench, speed_mps, 2.4, wrapped_for_s)
@@ -101,8 +103,8 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
     """The board restarts exactly when its clock wraps, so the clock does not show the restart.
 
-    The counts could also be from wheels that rolled back. The covariance contains the possible
-    error.
+    After the restart, the tick counts begin at zero. Wheels that rolled back would give the same
+    counts, so the driver assumes no restart. The covariance contains the possible error.
     """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.3, 0.0)
@@ -117,10 +119,11 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
-    """The robot drives forward and then back to where the counts are zero.
+    """The robot drives forward, and then backward until its tick counts are about zero.
 
-    The board's clock wraps when the robot arrives there. In one variant, a read is late as well, so
-    that the clock does not fit the arrival times. In both variants, the driver assumes no restart.
+    At this moment, the board's clock wraps. So clock and counts look as after a restart. In the
+    second case of the test, a read is also late, so the clock does not fit the arrival times. In
+    both cases, the driver assumes no restart.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6

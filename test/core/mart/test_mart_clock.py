@@ -45,8 +45,8 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
     """After a drive, the driver never sets a correct clock back.
 
-    The server ignores the seconds, so the clock can only be set to a full minute. The driver sends
-    the next full minute shortly before it begins.
+    The driver can set the clock only to a full minute, because the server ignores the seconds. So
+    it waits, and sends the next full minute shortly before this minute begins.
     """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
@@ -57,17 +57,18 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 
 
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
-    """The server's clock may be set back, because no drive has used it yet.
+    """No drive has used the server's clock yet, so the driver is allowed to set the clock back.
 
-    The clock is set at once, to the present date and time in UTC.
+    The driver sets it at once, to the present date and time in UTC.
     """
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """The server's clock is set back. The next forward drive (RM) reports a heading of about 1e15°.
+    """Between two drives, the user sets the server's clock back.
 
-    The driver repeats the start once.
+    Because of this, the second drive (RM, forward) begins with a reported heading of about 1e15°.
+    The driver starts this drive once more, and then it is as commanded.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

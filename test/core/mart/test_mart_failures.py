@@ -19,9 +19,9 @@ pytestmark = pytest.mark.slow
 def test_a_dead_imu_refuses_motion_until_it_is_back(
     firmware: Firmware, wish: tuple[float, float] | str
 ) -> None:
-    """With a dead IMU, the driver starts no motor and reports the reason.
+    """The IMU is dead. The driver starts no motor, and reports the reason.
 
-    On a server with RST IMU, motion is allowed when the IMU is back.
+    When the IMU works again, motion is allowed if the server has the command RST IMU.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -86,10 +86,11 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The server rejects one forward drive (RM) and obeys the next one. The driver ends that drive.
+    """The server rejects one forward drive (RM), and obeys the next RM. The driver ends this drive.
 
-    Later, the robot moves without a command. A motion after a rejected RM can show a defective
-    server. But an RM was obeyed in between, so the driver still allows motion.
+    Later, the robot moves without a command. If the robot moves after a rejected RM, the server may
+    be defective. But here the server has obeyed an RM since then, so the driver still allows
+    motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -213,8 +214,8 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 ) -> None:
     """One or both motors are stuck, so the driver switches both motors off.
 
-    Before that, the left wheel may turn the robot while the right wheel is stuck. The covariance of
-    the odometry covers this turn.
+    If only the right motor is stuck, the left wheel may turn the robot before the motors are off.
+    The covariance of the odometry includes this turn.
     """
     bench = MartBench(firmware).ready()
     if driving:
@@ -236,8 +237,8 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
     """The server rejects a forward drive (RM), but the robot moves.
 
-    The driver sends a stop, but the server knows of no motion. So the driver switches the motors
-    off, and then refuses motion.
+    The driver sends a stop. The server does not obey it, because it knows of no motion. So the
+    driver switches the motors off, and then refuses motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
@@ -268,9 +269,10 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """The server rejects a forward drive (RM). Later, a copy of RM arrives while replies are lost.
+    """The server rejects a forward drive (RM). Later, a copy of RM arrives and moves the robot.
 
-    The driver stops the robot, but does not refuse motion permanently.
+    At this time, the network loses replies. The driver stops the robot, but does not regard the
+    server as defective. So it does not refuse motion permanently.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

@@ -18,7 +18,8 @@ from omnibot_driver.simulator.mart import Firmware
 HEAVY_S = 0.2
 """Time constant in s of the motors of a heavy robot.
 
-Its wheels still turn when the server no longer waits for the end of a stop.
+After a stop, the server waits for a limited time until the wheels are at rest. The wheels of this
+robot turn for longer.
 """
 
 
@@ -66,9 +67,9 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
 def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
     before: tuple[float, float], firmware: Firmware
 ) -> None:
-    """A goal follows a drive of a heavy robot, whose wheels still turn long after the stop.
+    """The wheels of a heavy robot still turn long after a stop, so the server reports a failure.
 
-    The server reports this as a failure. One notice names it, and the robot reaches the goal.
+    A goal follows. One notice says that the wheels still turned, and the robot reaches the goal.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     bench.command(*before, 3.0)
@@ -103,8 +104,9 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """A motor is stuck, so the turn towards a goal does not begin. The driver discards the goal.
 
-    The server reports the failure "start timedout". It reports the same failure if a heavy robot
-    still moves some time after a turn. In that case, the driver continues to the goal.
+    The server reports the failure "start timedout". The driver must not discard the goal whenever
+    it gets this failure. If a heavy robot still moves some time after a turn, the server reports
+    the same failure, and the driver continues to the goal.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -117,9 +119,9 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
     """An obstacle ends a move of a heavy robot early. The server reports only a slow stop.
 
-    The reply to the next move shows the obstacle. The first move was too short because of the
-    obstacle, so the driver does not learn from its distance. For a later goal, the driver therefore
-    requests the usual distance, not a longer one.
+    The reply to the next move shows the driver that there was an obstacle. The distance of the
+    first move was too short because of the obstacle, so the driver learns nothing from it. For a
+    later goal, the driver therefore requests the usual distance, not a longer one.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -144,8 +146,9 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn has a wrong rate, so the driver stops it and starts it again, with other motor units.
 
-    The reply to the stop gives no angle, because the stop takes long, or because the reply is late.
-    So the driver learns the motors' speed from the encoder, and finds the new units by it.
+    The reply to the stop gives no angle: the stop takes too long, or the reply comes too late. So
+    the driver measures the motors' speed by the encoder, and computes the new motor units from this
+    speed.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)
@@ -161,10 +164,11 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     firmware: Firmware,
 ) -> None:
-    """The wheels of a heavy robot turn for 1.3 s after a stop.
+    """After a stop, the wheels of a heavy robot turn for another 1.3 s.
 
-    The server waits 0.6 s for them, and reports a failure. The driver does not report that the
-    robot moves without a command. Every second stop is an e-stop.
+    The server waits only 0.6 s for the end of the motion, and then reports a failure. The driver
+    does not report that the robot moves without a command. The test stops the robot by command and
+    by e-stop in turn.
     """
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):
@@ -178,9 +182,10 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
 
 
 def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
-    """The last reply before a gap in the network is the server's name, which measures nothing.
+    """Replies count against a silence, even if they contain no measurement.
 
-    The driver counts the silence from this reply on.
+    The last reply before a gap in the network is the server's name. The driver counts the silence
+    from this reply on.
     """
     bench = MartBench().ready()
     bench.speaks = False

@@ -69,7 +69,7 @@ DISOBEYING = {
 def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
     commanded: Triple, motion: Triple, fault: Fault
 ) -> None:
-    """The robot moves in another way than commanded, at once or after it obeyed for two seconds.
+    """The robot does not move as commanded, from the start or after it has obeyed for two seconds.
 
     The monitor finds the fault within 0.3 s.
     """
@@ -245,9 +245,10 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot that has obeyed Stop is pushed for a long time. The monitor reports repeated faults.
+    """A robot that has obeyed Stop is pushed for a long time.
 
-    The intervals between the faults grow. Each fault makes the driver send Stop.
+    The monitor reports a fault again and again. Each fault makes the driver send Stop. The
+    intervals between the faults grow.
     """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
@@ -255,9 +256,10 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot drives on, because it has not received Stop. A later Stop may reach it.
+    """A driven robot drives on, because it has not received Stop.
 
-    Therefore, the monitor reports a fault every 5 s. Each fault makes the driver send Stop.
+    If Stop is repeated, it may arrive. Therefore, the monitor reports a fault every 5 s, and each
+    fault makes the driver send Stop again. The intervals between the faults do not grow.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -296,10 +298,10 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """The outlier filter passes some impossible displacements on, marked as such.
+    """The outlier filter marks some displacements as impossible, but does not reject them.
 
-    Four such displacements in a row are a fault. After a possible displacement, the count begins at
-    zero again. While the robot rolls out after the fault, there is no second fault.
+    Four such displacements in a row are a fault. A possible displacement begins the count at zero
+    again. While the robot rolls out after the fault, there is no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)
@@ -316,9 +318,9 @@ def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correct
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """The same fault occurs repeatedly. It is new only the first time.
+    """A fault that occurs repeatedly is new to the user only the first time.
 
-    When the robot has obeyed a command in between, it is new again.
+    When the robot has obeyed a command in between, the same fault is new again.
     """
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)

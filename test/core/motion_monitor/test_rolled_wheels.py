@@ -41,8 +41,9 @@ def test_wheels_from_the_bodys_displacements_and_back(
 ) -> None:
     """The board reports displacements along the axes of the earth, or along those of the robot.
 
-    In both cases, ``rolled`` is the right sum of the displacements. The wheel angles are computed
-    from ``rolled``. If they are converted back, they give the turn in ``rolled``.
+    In both cases, ``rolled`` is the right sum of the displacements. The test converts ``rolled`` to
+    wheel angles, and these angles back to a motion of the body. This motion has the turn of
+    ``rolled``.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):

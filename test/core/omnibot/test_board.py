@@ -107,9 +107,10 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A «Paused» text continues an earlier one if no data and at most nine lost texts were between.
+    """A «Paused» text continues the «Paused» text that came directly before it.
 
-    If data or more lost texts were between the two, the board may have run or restarted meanwhile.
+    It continues the earlier text only if the board sent no data between the two, and at most nine
+    texts were lost. Otherwise the board may have run or restarted between the two texts.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]

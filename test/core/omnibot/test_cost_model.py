@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the cost of a frame: how little the frame's content fits the frames before it."""
+"""Tests of the cost of a frame. A frame that fits the frames before it badly has a high cost."""
 
 import pytest
 
@@ -12,7 +12,9 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """Return what the decoder knows after a pose with a heading of 100 mrad, and deltas after it.
+    """Return what the decoder knows after a pose, and after the deltas that follow this pose.
+
+    The pose has a heading of 100 mrad.
 
     ``turns``: turns of the deltas, in 0.1 mrad.
 

@@ -67,9 +67,9 @@ def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
 def test_all_frames_between_silences_come_in_any_chunks(
     bursts: list[list[Frame]], data: st.DataObject
 ) -> None:
-    """The board sends frames between silences, and the chunks end anywhere.
+    """The board sends frames in bursts, with silences between them. A chunk may end at any byte.
 
-    All frames are returned.
+    The decoder returns all frames.
     """
     made, now = FrameDecoder(), 0.0
     found = made.feed(REST * 2, now)[2:]
@@ -106,7 +106,7 @@ def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
     """A robot in free fall sends an IMU frame with an acceleration word of -6, -5 or -4.
 
     The bytes of -6 look like a header. So the decoder loses the frame with -6, but no other frame.
-    A frame is lost like this only below 0.5 g.
+    Above 0.5 g, the decoder does not lose a frame for this reason.
     """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)

@@ -140,8 +140,8 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
     """Each delta is rounded by up to 0.05 mrad in the same direction, so the errors add up.
 
-    The next pose may differ from the deltas by this sum, without a cost. A difference of more than
-    twice this sum has a cost.
+    If the next pose differs from the deltas by this sum, the pose has no cost: it contradicts
+    nothing. If it differs by more than twice this sum, it has a cost.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
@@ -188,9 +188,9 @@ def test_a_lost_delta_is_bridged_and_settled() -> None:
 
 @EVERY_PERIOD
 def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
-    """Deltas are lost, and their counter SEQ may wrap several times in the gap.
+    """At any delta period, the driver counts correctly how many deltas are lost in a gap.
 
-    The lost deltas are counted correctly.
+    In a long gap, the deltas' counter SEQ wraps several times.
     """
     schedule = Schedule(period_s)
     for lost in (0, 1, 7, 200, 256, 300, 1000):
@@ -261,10 +261,10 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 @pytest.mark.parametrize("running", [True, False])
 @pytest.mark.slow
 def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) -> None:
-    """The driver connects to a board in IMU-only mode, which may be paused at first.
+    """The driver connects to a board in IMU-only mode. The board may be paused at first.
 
-    The driver repeats the start every 0.5 s, because it has not seen the board running. This does
-    not keep the driver from recognizing IMU-only mode.
+    The driver sends the start (S) every 0.5 s, because it has not seen the board running. It
+    recognizes IMU-only mode nevertheless.
     """
     bench = Bench(BoardSettings(imu_only=True, running=running, delta_period_s=period_s))
     bench.open()
@@ -273,7 +273,11 @@ def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) 
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """23 damaged bytes come in place of an IMU frame and a delta. One lost IMU frame is counted."""
+    """At any delta period, the number of damaged bytes shows how many IMU frames were lost.
+
+    An IMU frame (14 bytes) and a delta (9 bytes) are damaged. The driver discards the 23 bytes, and
+    counts one lost IMU frame.
+    """
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)
     for _ in range(3):

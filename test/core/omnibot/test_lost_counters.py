@@ -25,9 +25,9 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 @cache
 def over_a_gap(lost: int, seed: int, frame: str) -> tuple[Line, list[OdometryEstimate]]:
-    """Return a simulated line that has run for 1 s since a gap, and its odometry estimates.
+    """Return a simulated line, 1 s after a gap of ``lost`` deltas, and its odometry estimates.
 
-    The first estimate is the last one before the gap. The others are from the 1 s after the gap.
+    The first estimate is the last one before the gap. The others are from the second after the gap.
     """
     on = line(seed, frame=frame)
     before = on.estimates[-1]
@@ -49,9 +49,10 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_short_gap_is_bridged_at_once() -> None:
-    """All frames are lost for 0.12 s. The motion of the gap is estimated at once, within 2 mm.
+    """All frames are lost for 0.12 s. With the next delta, odometry includes the motion of the gap.
 
-    It is interpolated between the motion before and after.
+    This motion is interpolated between the motion before and after the gap. The position is right
+    within 2 mm.
     """
     for seed in range(5):
         on = line(seed)
@@ -176,8 +177,8 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
     """Deltas are lost, and a pose arrives before the next delta.
 
-    The pose already includes the motion of the lost deltas. Only the next delta shows that deltas
-    were lost. Their motion is nevertheless added only once.
+    The pose already includes the motion of the lost deltas. Later, the counter of the next delta
+    shows that deltas were lost. The odometry does not add their motion a second time.
     """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of messages for users, which name only parts that the board has."""
+"""Tests of messages for users. The messages name only parts that the board has."""
 
 from dataclasses import replace
 
@@ -25,9 +25,9 @@ def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_cam
 
 
 def test_an_overrun_of_the_port_is_blamed_only_for_frames_lost_at_about_its_time() -> None:
-    """The port overruns, and an hour later frames are lost. The notice does not blame the overrun.
+    """The port overruns, and an hour later frames are lost. The notice does not name the overrun.
 
-    Frames that are lost at about the time of an overrun are blamed on it.
+    If frames are lost at about the time of an overrun, the notice names the overrun as the cause.
     """
     notices, none = Notices(), Refused(0, 0, 0)
     assert notices.counted(0, 0, none, 100.0) == []

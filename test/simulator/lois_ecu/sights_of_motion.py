@@ -34,7 +34,7 @@ def ticks_of_forward_targets(quirks: Quirks) -> bool:
 def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
     """Return whether message 0x20 reports less than 75 % of the distance driven straight.
 
-    The controllers of both wheels are equal here.
+    For this test, the controllers of both wheels get equal gains.
     """
     rig = Rig(quirks).booted()
     rig.say(WriteSetting(Setting.RIGHT_KP, 0.4412), WriteSetting(Setting.RIGHT_TN, 0.2865))
@@ -46,7 +46,8 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 def velocity_may_be_nan(quirks: Quirks) -> bool:
     """Return whether some velocities that are reported in a straight drive are not finite.
 
-    Both wheels start together with the same duty. Many of their ticks therefore coincide.
+    Both wheels start together with the same duty, so many of their ticks coincide. Ticks that
+    coincide can make the board divide by zero.
     """
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60), SetDuty(60, 60))
@@ -111,7 +112,10 @@ def low_pass_starts_at_zero(quirks: Quirks) -> bool:
 
 
 def slow_timer(quirks: Quirks) -> bool:
-    """Return whether the measured speed is over 0.35 % too high. The slow timer causes 0.7 %."""
+    """Return whether the measured speed is over 0.35 % too high.
+
+    If the board has a slow timer, the measured speed is 0.7 % too high.
+    """
     rig = Rig(quirks).booted()
     rig.drive(30, 30, 0.5)
     rig.say(SetDuty(50, 50))

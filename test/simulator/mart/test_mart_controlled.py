@@ -86,7 +86,7 @@ def test_a_negative_distance_is_refused() -> None:
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     """The distance of a move is zero or a word. On the public server, the move has no limit.
 
-    If this quirk is switched off, the server refuses the move.
+    If the public server's quirk ``zero_distance_is_unlimited`` is off, the server refuses the move.
     """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
@@ -106,9 +106,9 @@ def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     ],
 )
 def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
-    """A command has no distance, and the server refuses it.
+    """The server refuses a command that has no distance or angle.
 
-    The server misspells "missing" in the replies to TF and TB.
+    Its reply says "missing parameter", but "missing" is misspelt in the replies to TF and TB.
     """
     assert Rig().ask(text) == answer
 
@@ -128,9 +128,9 @@ def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
 
 
 def test_near_an_obstacle_tb_fails_likewise() -> None:
-    """A move backward (TB) begins near an obstacle behind the robot.
+    """A straight move backward (TB) fails if an obstacle is behind the robot at its start.
 
-    The server reads the rear sonar, and the move fails.
+    The server notices the obstacle by the rear sonar.
     """
     rig = Rig(rear_m=12 * INCH_M)
     assert rig.ask("TB 24") == "fail Insufficient rear clearance."

@@ -25,10 +25,10 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether the server regards a motion as in progress after a stop by SL.
+    """Return whether the server regards a drive (F) as in progress after it was stopped by SL.
 
-    SL comes on the stop port. The server then refuses motions, and the usual stop (SM) hangs the
-    command port.
+    SL is a stop on the stop port. If the drive counts as in progress, the server refuses other
+    motions. The usual stop (SM) then hangs the command port.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -102,7 +102,7 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 def reference_start_counts_on(quirks: Quirks) -> bool:
     """Return whether a forward drive (RM) fails if it directly follows a stop that took 0.57 s.
 
-    If it fails, a second RM must succeed.
+    If this RM fails, the function checks that a second RM succeeds.
     """
     rig = Rig(quirks)
     rig.drive("RM 66")
@@ -163,7 +163,10 @@ def empty_datagram_ends(quirks: Quirks) -> bool:
 
 
 def exit_is_silent(quirks: Quirks) -> bool:
-    """Return whether EXIT, which ends the server, is not answered if no log was started."""
+    """Return whether the server does not answer EXIT, the command that ends the server.
+
+    A server with this quirk answers EXIT only after LOG. The function does not send LOG.
+    """
     return Rig(quirks).ask("EXIT") is None
 
 
@@ -297,9 +300,9 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """A command has too few numbers, and the quirk with which this crashes the server is off.
+    """A command has too few numbers. The quirk is off with which such a command crashes the server.
 
-    The server replies that the command's format is wrong, and then answers HELLO.
+    The server replies that the command's format is wrong. It then still answers HELLO.
     """
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":

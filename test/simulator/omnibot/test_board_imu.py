@@ -69,9 +69,10 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """The robot accelerates forward and to the left. The accelerations add up to the speed.
+    """A robot that accelerates to the left measures a negative acceleration along y.
 
-    The sensor is mounted upside down, so y is reversed.
+    The sensor is mounted upside down, so y is reversed. In the test, the robot accelerates forward
+    and to the left. The sum of the measured accelerations over time is the speed.
     """
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
@@ -109,7 +110,7 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
 def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
     """The gyro's bias changes at random.
 
-    After a second, its RMS over sixty robots is the value in the settings.
+    After a second, the RMS of the bias over sixty robots is the value in the settings.
     """
     ends = []
     for seed in range(60):
@@ -127,9 +128,9 @@ def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
 
 
 def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
-    """A gyro is stuck at given counts.
+    """A gyro is stuck: it always reads the same counts.
 
-    In a turn it still reads them, while the accelerometer varies.
+    It reads them even in a turn, while the accelerometer varies.
     """
     board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))
     board.receive(velocity(0, 0, 250))

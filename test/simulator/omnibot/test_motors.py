@@ -10,7 +10,7 @@ from omnibot_driver.simulator.omnibot.motors import DEAD_ZONE_PWM, PWM_LIMIT, Mo
 
 
 class Wheel:
-    """A motor and its controller, which measures the speed by the encoder, as the firmware does."""
+    """A motor and its controller. The controller measures the speed by the encoder."""
 
     def __init__(self) -> None:
         self.motor = Motor()

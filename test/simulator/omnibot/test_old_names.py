@@ -32,7 +32,7 @@ def test_a_name_that_never_was_there_is_not_found() -> None:
 
 
 def test_no_board_is_imported_before_it_is_asked_for() -> None:
-    """A program imports the simulator, but no board. The OmniBot is not loaded."""
+    """A program imports the simulator, but no board. This import does not load the OmniBot."""
     program = "import sys, omnibot_driver.simulator; print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT

@@ -6,8 +6,8 @@ Run this by hand, with the number of robots and optionally the first seed (2 min
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-The program prints the overshoot of the true wheel speeds in a step with the gains found. In this
-step, the marks of the encoders are evenly spaced.
+The program prints the overshoot of the true wheel speeds in a step with the gains that ``calibrate
+step`` found. For this step, the robot's encoders have evenly spaced marks.
 """
 
 import contextlib
