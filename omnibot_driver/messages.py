@@ -52,7 +52,7 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 
 * Sum of the robot's displacements along the board's axes, in m and rad.
 * Angle of each wheel, in rad.
-* Rate of each wheel, in rad/s. Empty if unknown.
+* Rate of each wheel, in rad/s. This tuple is empty if the rates are unknown.
 """
 
 
@@ -155,7 +155,7 @@ def unturned(kinematics: Kinematics) -> Wheels:
 
 
 def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -> Wheels:
-    """Return the state of the wheels after ``estimate``, given their state ``before``."""
+    """Return the state of the wheels after ``estimate``. ``before``: their previous state."""
     rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
     way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
     angles = tuple(map(add, angles, kinematics.wheel_rates(way)))

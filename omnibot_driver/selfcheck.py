@@ -59,7 +59,8 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 def waiting_advice(port: str, now_ns: int) -> str:
     """Return a warning if the node's clock, ``now_ns``, is still 0; otherwise empty.
 
-    A recording has its own stamps, so it needs no clock.
+    If the port is a recording, the result is empty: a recording has its own stamps and needs no
+    clock.
     """
     if now_ns or port.lower().startswith(RECORDING):
         return ""

@@ -105,7 +105,7 @@ def test_nobody_claims_what_is_not_next() -> None:
 def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
     """One thread delivers. Another thread puts events into the outbox and returns at once.
 
-    Its events are delivered after the current one.
+    The first thread delivers these events after the event that it is delivering.
     """
     outbox = Outbox()
     left: list[str] = []

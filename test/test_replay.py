@@ -182,7 +182,10 @@ def test_stamps_are_times_of_the_recording() -> None:
 
 
 def test_a_recording_can_be_left_before_its_end() -> None:
-    """A replay is closed before its recording begins, or in the middle. The close does not wait."""
+    """A replay is closed before it plays the first bytes, or in the middle of its recording.
+
+    The close does not wait for the end of the recording.
+    """
     for tape in (Tape(BAD_LINE, speed=1e-3), Tape(BAD_LINE, delay_s=3600.0)):
         replay, heard = start(tape)
         if tape.delay_s == 0.0:

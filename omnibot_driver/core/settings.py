@@ -14,7 +14,7 @@ from omnibot_driver.core.odometry.estimator import OdometrySettings
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionSettings:
-    """The settings of a session, replaced as one value."""
+    """The settings of a session. To change one of them, replace the whole object."""
 
     limits: SpeedLimits
     commands: CommandSettings
@@ -22,12 +22,12 @@ class SessionSettings:
     motion: MotionLimits = field(default_factory=MotionLimits)
     imu: ImuCorrection = field(default_factory=ImuCorrection)
     motion_monitor: bool = True
-    """Whether a robot that does not move as commanded is stopped."""
+    """Whether the driver stops a robot that does not move as commanded."""
 
     @property
     def kinematics(self) -> Kinematics:
-        """Geometry of the robot's wheels, with a wheel radius of 1 m.
+        """Geometry of the robot's wheels, but with a wheel radius of 1 m.
 
-        So a wheel rate in rad/s is also the rim's speed in m/s.
+        With this radius, a wheel rate in rad/s is also the rim's speed in m/s.
         """
         return self.odometry.noise.wheels

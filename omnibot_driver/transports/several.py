@@ -39,7 +39,7 @@ Opener = Callable[[], ByteLine]
 
 
 class Several:
-    """A ``Transport`` of lines with one channel each, which are polled together."""
+    """A ``Transport`` of several lines. Each line is one channel. All lines are polled together."""
 
     def __init__(self, openers: Sequence[Opener], retry_s: float = RETRY_S) -> None:
         """Open the lines.
@@ -73,8 +73,8 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        If the guard process had a copy of a missing line's descriptor, the driver could not open
-        this line again.
+        The guard process gets copies of these descriptors. With a copy of a missing line's
+        descriptor in the guard process, the driver could not open this line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -132,7 +132,8 @@ class Several:
 
         Bytes that a line does not accept at once wait, and are sent later. If a line has had
         waiting bytes for 0.2 s without a break, these bytes are discarded, and the line is regarded
-        as missing. A missing line gets only the bytes that it accepts at once.
+        as missing. The port of a missing line may still be open. It then gets only the bytes that
+        it accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -269,7 +270,10 @@ class Line:
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes, over all connections; None if it does not count."""
+        """How often the kernel has lost bytes of this line; None if the kernel does not count.
+
+        Earlier connections are included.
+        """
         if self.port is not None:
             if (count := self.port.overruns) is None:
                 return None
@@ -287,7 +291,8 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
 
-        If the line is missing, write only the part of ``data`` that the port accepts at once.
+        If the line is regarded as missing, but its port is still open, write only the part of
+        ``data`` that the port accepts at once.
         """
         if self.port is None:
             return True

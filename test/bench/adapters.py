@@ -16,7 +16,7 @@ PACKET: Final = 62
 DRIFT: Final = 1.0002
 """Real period of the adapter's timer by the board's clock, divided by its nominal period.
 
-Within 10 s, the difference makes the packets end at all phases of the board's tick.
+Because the two periods differ, the packets end at all phases of the board's tick within 10 s.
 """
 
 Handed = tuple[float, bytes]

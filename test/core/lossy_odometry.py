@@ -96,10 +96,10 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to command motion. This is so if the test wants to drive and the board runs.
+        """Whether to command motion: the test wants to drive, and the board runs.
 
-        If not, zeros are commanded: a paused board may mistake a byte of a motion command for a
-        letter such as P.
+        Otherwise zeros are commanded. A motion command would be dangerous while the board is
+        paused: the board may mistake one of its bytes for a letter such as P.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

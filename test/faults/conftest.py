@@ -20,7 +20,7 @@ def _ros() -> Iterator[None]:
 def lenience() -> dict[str, float]:
     """Return three durations for ``Rig``, in s. They are suitable for a busy computer.
 
-    ``rest_s`` is short, but long enough for six commands. A commander that does not stop is
-    therefore noticed. ``make faults`` uses other times: 0.1 s, 2 s and 1 s.
+    A commander sends six commands in ``rest_s``, so the rig still notices if a commander does not
+    stop. ``make faults`` uses other durations: 0.1 s, 2 s and 1 s, in the same order.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}

@@ -47,7 +47,7 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_are_pursued_by_what_was_sent(goals: GoalRig) -> None:
-    """In the tests above, the board has sent every message that the driver has published."""
+    """During the earlier tests of this module, the driver published only what the board sent."""
     goals.judge_stream()
     assert not goals.findings.take(), goals.driver.output
     assert goals.findings.published > 50

@@ -22,9 +22,9 @@ class Understood:
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the next write that differs from it. A write
-    differs if it begins or ends a motion, waits for the line, may be discarded in part, or is
-    misunderstood by the receiver.
+    ``alike_until``: for each write, the index of the next write that is special. A write is special
+    if it begins or ends a motion, waits for the line, may be discarded in part, or is misunderstood
+    by the receiver.
     """
 
     held: list[bytes]

@@ -7,8 +7,8 @@
 - An *uncommanded* set-point is in neither of these writes. It lasts until a commanded set-point, a
   pause or a reboot.
 - A *stray* motion frame is one that the board understands while the driver does not drive.
-- A *false* letter is a byte that the driver has sent, but not as a letter. An *added* letter is a
-  byte that faults of the line have added or changed.
+- A *false* letter is a byte that the driver has sent as a part of a frame, and that the board takes
+  for a letter. An *added* letter is a byte that faults of the line have added or changed.
 """
 
 import math
@@ -91,13 +91,13 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether the active set-point, if any, is neither stray nor uncommanded."""
+        """Whether no stray and no uncommanded set-point is active."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
-        """Return a judge that continues from here in a further trial.
+        """Return a copy of this judge in its present state, for a further trial.
 
-        The new judge adds its counts to ``score``.
+        The copy adds its counts to ``score``.
         """
         other = copy(self)
         other.score = score
@@ -154,7 +154,7 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return "false letter" or "".
 
-        The letter is false if it is a byte of the driver's write that was not sent as a letter.
+        The letter is false if the driver sent this byte as a part of a frame.
 
         ``at``: position of the letter in the write. If faults of the line have added or changed the
         letter, the position is negative.
@@ -181,7 +181,11 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """End the scene. Return whether the robot drives when it must be at rest, or at the end."""
+        """End the scene. Return whether one of the arguments is True.
+
+        ``driven_when_due``: whether the robot still drove at the time at which it had to be at
+        rest. ``driven``: whether it still drove at the end.
+        """
         self.no_setpoint(at_s)
         if self.driving:
             self.score.driving_s += at_s - self._driving_from_s

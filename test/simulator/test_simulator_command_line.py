@@ -36,9 +36,9 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """The program's input has ended. Only a signal ends the program.
+    """The program's input has ended, but the program continues until it gets a signal.
 
-    The program then removes its links, and its exit code is 0.
+    After the signal, the program removes its links and ends with exit code 0.
     """
     link = tmp_path / "toy"
     with toy("toy_lines", "--link", str(link), stdin=subprocess.DEVNULL) as process:
@@ -105,7 +105,7 @@ def test_the_boards_are_the_packages_beside_what_they_share() -> None:
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
     """A user gives one ``--link`` for a board with two lines. Each line gets a link.
 
-    The hint has all port parameters of the driver.
+    The program prints a hint how to start the driver. It contains the parameter of each port.
     """
     with toy("toy_lines", "--link", str(tmp_path / "toy"), "--angle", "30") as process:
         printed = [line(process), line(process)]

@@ -226,7 +226,7 @@ def test_a_twist_that_is_not_finite_anywhere_is_refused(
 def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBoard) -> None:
     """A user commands 1e300 m/s to the front left.
 
-    The driver commands its limit in the same direction.
+    The driver limits the speed, and keeps the direction.
     """
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()

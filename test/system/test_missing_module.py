@@ -46,7 +46,10 @@ def started_with(**environment: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_it_says_that_a_domain_is_too_large() -> None:
-    """ROS_DOMAIN_ID is too large. The driver says so; Fast DDS would end it without a message."""
+    """ROS_DOMAIN_ID is too large. The driver ends and says so.
+
+    Without the driver's check, Fast DDS would end the driver without a message.
+    """
     done = started_with(ROS_DOMAIN_ID="233")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (

@@ -149,7 +149,7 @@ def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_pipe_gets_a_snapshot(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """Without a terminal the monitor prints one snapshot, as with ``--once``, and says so."""
+    """Without a terminal, the monitor prints one snapshot, and says why on stderr."""
     measure(fake, Odometry())
     assert main(["--namespace", "fake"]) == 0
     output = capsys.readouterr()

@@ -142,9 +142,9 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """A motor runs in the manual's control loop.
+    """The calculated angle of a motor in the manual's control loop fits its calculated speeds.
 
-    The angle at the end of a tick is the sum of all speeds so far, times the tick period.
+    The angle at the end of a tick is the sum of the speeds up to this tick, times the tick period.
     """
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))

@@ -49,9 +49,9 @@ class Interlocks:
     def refused(self, now: float) -> None:
         """Record that a motion command was refused, so that its sender is known to be active.
 
-        The motion interlock may wait until no command has arrived for some time. A refused command
-        makes this wait begin again. Call this for every refused command, even if the refusal did
-        not come from this class.
+        After the motion monitor has stopped the robot, motion may be refused until no command has
+        arrived for some time. A refused command begins this time anew. Call this method for every
+        refused command, even if the refusal did not come from this class.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 
@@ -85,8 +85,8 @@ class Interlocks:
     def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
-        While the board is silent, the robot's place is unknown. Later data would add motion from
-        before the reset.
+        While the board is silent, the driver does not know where the robot is. Data that arrives
+        after a reset would then add motion from before the reset to the pose.
         """
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN

@@ -145,9 +145,11 @@ class CommandPipeline:
         self._monitor.release()
 
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
-        """Return the command for a body velocity. Raises CommandRefused if it is not allowed.
+        """Return the command for a body velocity.
 
-        ``age_s``: age of the sender's stamp in s. The command expires earlier by this time.
+        Raises CommandRefused if the velocity is not allowed, or if the sender's stamp is too old.
+
+        ``age_s``: age of the sender's stamp in s. The command expires earlier by this age.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -197,8 +199,8 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion is taken from the newest estimate. If this estimate has no motion, it is taken
-        from ``reading``.
+        The motion is taken from the newest estimate. If there is no estimate with a motion, the
+        motion is taken from ``reading``.
         """
         if not reading.possible:
             return self._monitor.count_impossible(now)

@@ -2,8 +2,9 @@
 
 """The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-A board does not stop by itself. This module knows commands and times; it does not know how Stop is
-encoded, and reads no clock.
+A board continues the last motion until it receives Stop. So the driver must send Stop when a
+command expires. This module knows commands and times; it does not know how Stop is encoded, and
+reads no clock.
 """
 
 import math

@@ -20,10 +20,11 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 PACE_S: Final = 0.01
 """Shortest time between frames, in s. More frequent frames would only fill a buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
+"""Shortest time between two set-points, in s. It does not slow commands at 50 Hz.
 
-With a shorter time, more set-points are sent, and lost bytes damage more of them. Wrong set-points
-would be in effect for a larger part of the time (docs/internals/integrity.md).
+A shorter time would be worse on a line that loses bytes. The driver would send more set-points, and
+more of them would be damaged. So the board would obey wrong set-points for a larger part of the
+time (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
@@ -39,7 +40,10 @@ class Encoder(Protocol):
         """Return the packets of the board's own emergency stop. They do not contain a Stop."""
 
     def encode(self, order: Order) -> Packets:
-        """Return the packets for this order. Raises CommandRefused if it cannot be encoded."""
+        """Return the packets that command ``order``.
+
+        Raises CommandRefused if the board's frames cannot express ``order``.
+        """
 
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the rounded body velocity that these packets command, in the board's axes."""
@@ -98,9 +102,11 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        The board may hold an incomplete motion frame, whose last bytes were lost. Packets other
-        than Stop can complete this frame to a wrong motion. Stop ends the motion in effect. So the
-        set-point is sent again at once, except a zero set-point after Stop.
+        The set-point in effect is sent again at once, for two reasons. If the packets are Stop,
+        they have ended the motion. If they are not Stop, they may have caused a wrong motion: the
+        board may hold a motion frame whose last bytes were lost, and the packets complete it.
+
+        A zero set-point is not sent again after Stop.
         """
         if self._heard is not None:
             self._heard(packets, now)

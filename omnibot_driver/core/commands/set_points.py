@@ -22,8 +22,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: growth of the distance to the goal, in m and rad, that shows that
-the robot drives away from it. No controller overshoots as far."""
+"""``LEAVING_M``, ``LEAVING_RAD``: limits in m and rad. If the distance or the angle to the goal
+grows by more than its limit, the robot drives away from the goal. No controller overshoots as
+far."""
 
 
 class Authority(Enum):
@@ -64,8 +65,9 @@ class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
     * The attribute ``is_zero``: whether the order makes the robot stand still.
-    * The argument ``is_zero``: function that returns this for an order, or raises CommandRefused.
-    * ``before``: the previous set-point. If that is a body velocity, the new ramp starts at the
+    * The argument ``is_zero``: function that returns whether an order makes the robot stand still.
+      It raises CommandRefused if the order cannot be encoded.
+    * ``before``: the previous set-point. If it is a body velocity, the new ramp starts at the
       velocity that the previous ramp has reached. Otherwise, the new ramp starts at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
@@ -116,7 +118,8 @@ class SteadySetpoint:
     """A command whose order does not change.
 
     * The attribute ``is_zero``: whether the order makes the robot stand still.
-    * The argument ``is_zero``: function that returns this for an order, or raises CommandRefused.
+    * The argument ``is_zero``: function that returns whether an order makes the robot stand still.
+      It raises CommandRefused if the order cannot be encoded.
     """
 
     settled: Final = True
@@ -145,7 +148,8 @@ class GoalSetpoint:
     * ``place``: the same pose in the board's earth frame.
     * ``alignment``: how often the relation of these two frames had changed before the command
       (``Odometry.alignments``). A further change makes ``place`` wrong, so the goal is discarded.
-    * ``check``: function that raises CommandRefused if the order cannot be encoded.
+    * ``check``: function that raises CommandRefused if the order to drive to ``place`` cannot be
+      encoded.
     * ``direct``: whether the board drives straight to the goal.
     """
 

@@ -18,7 +18,7 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""Time in s that a moving robot gets to stop before a configuration is loaded."""
+"""Time in s from Stop to the loading of a configuration. A moving robot stops in this time."""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 

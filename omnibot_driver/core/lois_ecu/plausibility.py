@@ -60,7 +60,10 @@ def wrapped(difference: int) -> int:
 
 
 def began_within(duration_s: float, ticks: Ticks, ticks_per_revolution: int) -> bool:
-    """Return whether clock (in ns) and counts may have begun at zero in the last ``duration_s``."""
+    """Return whether the board may have restarted in the last ``duration_s``.
+
+    A restart sets the board's clock (in ns) and its tick counts to zero.
+    """
     age_s = ticks.time_counts * 1e-9
     most = ROLLED_OUT_TURNS * ticks_per_revolution + ROLLED_OUT_TICKS
     most += STARTING_TURNS_PER_S * ticks_per_revolution * age_s
@@ -188,9 +191,9 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 
 
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
-    """Return whether a report's position is finite and in range. Ticks are always in range.
+    """Return whether the position in a report is finite and in range.
 
-    Velocities are not checked.
+    A report of ticks has no position, so the result is True. Velocities are not checked.
     """
     match group:
         case GpsPosition(latitude, longitude):

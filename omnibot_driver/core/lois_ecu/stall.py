@@ -22,8 +22,8 @@ STALLED_S: Final = 2.0
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 LEAST_TICKS: Final = 2
-"""Smallest number of ticks in ``STALLED_S`` that a set-point must give, so that its wheel is
-watched. With fewer ticks, a wheel that rolls may show no motion."""
+"""Smallest number of ticks in ``STALLED_S`` for which a wheel is watched. It is computed from the
+wheel's set-point. With fewer ticks, a wheel that rolls may show no motion."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
@@ -32,7 +32,8 @@ TOO_FAST_RPM: Final = 3
 is an old one, and the wheel is at rest."""
 UNLIKE: Final = 1.15
 """Largest assumed ratio between the factors of the two wheels. The factor of a wheel is its speed
-divided by its set-point. Backward, both wheels may roll too fast, but with similar factors."""
+divided by its set-point. Wheels that roll backward may be too fast, but both have similar
+factors."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
@@ -48,9 +49,9 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. This is so
-    if the repeated speed is higher than the speeds that the board usually repeats for a wheel at
-    rest.
+    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. It may
+    roll if the board repeats a speed that is higher than those that the board usually repeats for a
+    wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -66,7 +67,7 @@ class StallWatch:
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record a set-point. A wheel with a duty is never regarded as stalled."""
+        """Record a set-point. While a duty is commanded, no wheel is regarded as stalled."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
@@ -87,8 +88,8 @@ class StallWatch:
     ) -> None:
         """Process a report: ticks, or the board's odometry.
 
-        Ticks show whether a wheel turns that is commanded forward. The board's odometry shows
-        whether a wheel turns that is commanded backward.
+        If a wheel is commanded forward, the ticks show whether it turns. If it is commanded
+        backward, the board's odometry shows this.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """
@@ -112,11 +113,11 @@ class StallWatch:
                     self._note(wheel, now, turns=ticked[wheel])
 
     def stalled(self, now: float) -> tuple[bool, bool]:
-        """Return which commanded wheels have not turned for ``STALLED_S``.
+        """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
-        The standstill must be shown by at least ``AT_LEAST`` reports (backward:
-        ``AT_LEAST_BACKWARD``). After a stall is returned for one wheel, the time of both wheels is
-        counted from zero again.
+        At least ``AT_LEAST`` reports must show the standstill. For a wheel commanded backward, at
+        least ``AT_LEAST_BACKWARD`` reports must show it. After the result was True for one wheel,
+        the times and the reports of both wheels are counted from zero again.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)

@@ -100,7 +100,7 @@ class Adjusting(Moves):
         self.odometry.doubt.add((most_m / 2) ** 2, turn_rad**2)
 
     def _learn_standing(self) -> None:
-        """Record that the motor units now in use are too small to turn the motors.
+        """Record that the present motor units are too small to turn the motors.
 
         If the robot has already moved in this motion, nothing is recorded: the units were
         sufficient, and an obstacle blocks the robot.

@@ -16,9 +16,9 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""The driver gives up after this number of starts in a row that do not turn the right wheel. Only
-starts of a backward drive (B) or a turn (R, L) are counted. Each of them may have turned the left
-wheel, and so the robot."""
+"""Number of starts in a row that do not turn the right wheel, after which the driver gives up. Only
+starts of a backward drive (B) or a turn (R, L) are counted. Although the right wheel rests, each of
+these starts may have turned the left wheel, and so moved the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
@@ -30,10 +30,10 @@ class FailedStarts(Adjusting):
     """The part of the pilot that evaluates failed starts."""
 
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
-        """Stop the robot after a failed start, because it may move nevertheless.
+        """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: whether the reply certainly belongs to this start, and the network is so good
-        that it hardly delivers a late copy of the start.
+        ``arrived``: whether the reply certainly answers the failed start command, and the network
+        is so good that it hardly delivers a late copy of this command.
         """
         word = self._start
         assert word is not None
@@ -68,7 +68,10 @@ class FailedStarts(Adjusting):
         self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _not_turned(self) -> str:
-        """Count a start that did not turn the right wheel. Return what the driver does now."""
+        """Count a start that did not turn the right wheel.
+
+        Return a text for the user, which says what the driver does now.
+        """
         self._no_starts += 1
         if self._no_starts < NO_STARTS:
             return "the right wheel has not turned, so the driver tries again"

@@ -13,9 +13,12 @@ LOWEST_SLOPE, HIGHEST_SLOPE = 0.4, 2.5
 MOST_DEAD: Final = 20.0
 """Largest number of units that a motor is assumed to need before it turns."""
 SLOPE_SD, OFFSET_SD = 0.3, 4.0
-"""Initial standard deviations of the slope (around 1) and of the offset (around 0 units)."""
+"""Standard deviations of ``slope`` and ``offset`` in a MotorLine that has learned nothing yet.
+
+Its slope is about 1, and its offset is 0. The offset is in nominal units.
+"""
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
-"""Standard deviations of how much slope and offset change between two measurements.
+"""Standard deviations of the changes of ``slope`` and ``offset`` between two measurements.
 
 The offset is in nominal units.
 """
@@ -91,7 +94,7 @@ class MotorLine:
         return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
 
     def restore(self, before: "MotorLine") -> None:
-        """Return to the state of ``before``, an earlier copy of this line."""
+        """Return to the state of ``before``, an earlier copy of this MotorLine."""
         self.__dict__.update(before.__dict__)
 
     def rescale(self, factor: float) -> None:

@@ -94,7 +94,10 @@ class Reckoning(CorrectedPose):
         self.speeds.forget()
 
     def appear(self) -> None:
-        """Record that the server may have been restarted: count and heading may begin at zero."""
+        """Record that the server may have been restarted.
+
+        Its encoder count and its heading may have begun at zero again.
+        """
         self.wheel.appear()
         self.heading.may_begin_anew = True
 
@@ -114,9 +117,9 @@ class Reckoning(CorrectedPose):
         self._guessed = False
 
     def started(self, now: float, *, sure: bool) -> None:
-        """Record that the server has acknowledged the start.
+        """Record that the server has acknowledged the start of the motion.
 
-        ``sure``: whether the reply certainly belongs to this start.
+        ``sure``: whether the reply certainly answers the start command of this motion.
         """
         if sure:
             self.wheel.started()
@@ -137,13 +140,13 @@ class Reckoning(CorrectedPose):
         self.stands, self._stood_s = True, now
 
     def rest(self, longest: float = math.inf) -> float:
-        """End the motion. Called after its last count, so the coasted distance is included.
+        """End the motion. Called after its last encoder count, which includes the coasted distance.
 
-        After a turn on the spot, compare the angle that the wheel measured with the angle that the
-        server reported. If the server's angle is implausible, return the wheel's angle minus the
-        server's, in rad. In all other cases, return 0.
+        After a turn on the spot, compare the angle by the wheel's encoder with the angle that the
+        server has reported. If the server's angle is implausible, return the encoder's angle minus
+        the server's angle, in rad. In all other cases, return 0.
 
-        ``longest``: longest possible distance of a straight move in m, or turn in rad.
+        ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
         """
         wrong_rad = 0.0
         if self.motion is Motion.NONE:
@@ -238,9 +241,9 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        If the start command may be lost, the last count may be from before the start. The pose then
-        does not include this count, and this property has its motion. Otherwise both values are
-        zero.
+        If the start command may be lost, the last encoder count may be from before the start. So
+        the pose does not include this count. If the count is from after the start, the pose lacks
+        the motion that this property returns. Without such a count, both values are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -274,7 +277,8 @@ class Reckoning(CorrectedPose):
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct a heading that was computed from commands, once the server reports the turn.
 
-        Return the correction in rad. It is not a motion of the robot.
+        Return the correction in rad. It ends an error of the heading, and is not a motion of the
+        robot.
         """
         if not self._guessed:
             return 0.0

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings that a MART controller does not report: sizes, scales, network. Values only."""
+"""Settings that a MART controller does not report: sizes, scales, network.
+
+This module has only values. It does not know how they are used.
+"""
 
 from dataclasses import dataclass
 from typing import Literal

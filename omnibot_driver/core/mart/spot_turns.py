@@ -36,7 +36,7 @@ Both are fractions of the commanded rate.
 ``HELD``: least measured rate from which the driver learns, if it has learned from a turn before.
 
 ``LEAST_LESSON``: least rate that the driver learns. If the measured rate is lower, the driver
-learns this rate instead.
+learns the least rate instead.
 """
 EVEN: Final = 0.15
 """Relative change of a turn's rate below which the driver learns from the turn."""
@@ -68,13 +68,14 @@ the wheel measured.
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
 
-A larger difference means that the number is an encoder count. The limit is UNSURE_RAD (rad), plus
-UNSURE_PART times the expected turn, plus the turn during two queries.
+If the difference is larger, the number in the reply may be an encoder count instead of an angle.
+The limit is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the angle by which the
+robot turns during two queries.
 """
 JUST_SET_S: Final = 2.0
-"""Time in s for which the server certainly keeps the speed of turns that SSP has set."""
+"""Time in s after an SSP request in which the server certainly keeps the speed that SSP has set."""
 SLOW_UNITS: Final = 20
-"""Motor units with which the server starts B (backward) and turns on the spot at the speed SLOW."""
+"""Motor units of the server's speed SLOW, in backward drives (B) and in turns on the spot."""
 SETTING_REFUSED: Final = (
     "the server does not accept a speed for turns on the spot, so it makes all of them at its"
     " own speed SLOW, which is faster than most commanded turns; `spin_speed: fixed` has the"
@@ -85,8 +86,9 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn. The request SSP sets the units of the next turn; from
-    that request on, ``units`` has these. 0 at the beginning of a connection.
+    ``units``: motor units of the last turn. After a request SSP, which sets the motor units of the
+    next turn, ``units`` has the units of the next turn. At the beginning of a connection, ``units``
+    is 0.
 
     ``seen_radps``: measured rate of the last turn, in rad/s.
 
@@ -99,7 +101,7 @@ class SpotTurns:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: nothing is known of the server's setting."""
+        """Begin a new connection. The speed that the server has set for turns is unknown."""
         self.units = 0
         self.seen_radps = self._rate_radps = self._corrected_radps = 0.0
         self._corrections, self._has_learned = 0, False
@@ -122,10 +124,10 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The caller must send it before the check of the IMU.
+        The caller must send the request before the check of the IMU that precedes the turn.
 
-        ``delay_s``: shortest time in s between two of these requests, so that no copy of the first
-        one can arrive after the second one.
+        ``delay_s``: shortest time in s between two SSP requests. After this time, no copy of the
+        earlier request can arrive any more.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -146,7 +148,7 @@ class SpotTurns:
         self._refused = True
 
     def forget_setting(self) -> None:
-        """Record that the server may have been restarted, and may have lost the setting."""
+        """Record that the server may have been restarted, and may have lost the speed of turns."""
         self._set_units = None
 
     def may_be_forgotten(self, now: float) -> bool:
@@ -161,9 +163,9 @@ class SpotTurns:
             self.units = SLOW_UNITS
 
     def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
-        """Return whether the current turn may continue while this rate is commanded.
+        """Return whether the current turn may continue while ``rate_radps`` is commanded.
 
-        ``turned_s``: time since the turn began, in s.
+        ``turned_s``: time since the current turn began, in s.
 
         ``disturbed``: whether measurements may be missing.
         """
@@ -207,7 +209,7 @@ class SpotTurns:
         return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
     def _is_held(self, seen_radps: float) -> bool:
-        """Return whether something holds the robot, so that its rate must not be learned."""
+        """Return whether something holds the robot: the driver must not learn from its rate."""
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
@@ -220,7 +222,7 @@ class SpotTurns:
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        ``unseen_s``: time in s from the last count to the first stop command.
+        ``unseen_s``: time in s from the last encoder count to the first stop command.
 
         ``trip_s``: average duration of a query, in s.
         """
@@ -238,11 +240,11 @@ class SpotTurns:
     ) -> None:
         """Evaluate a turn that was stopped.
 
-        ``degrees``: angle in the reply to the stop; None if there was no angle.
+        ``degrees``: angle in the reply to the stop command; None if there was no angle.
 
-        ``uncounted_s``: time in s from the last count to the first stop command. ``turned_s``: time
-        in s since the turn began. ``disturbed``: whether the network is disturbed, so that nothing
-        is learned.
+        ``uncounted_s``: time in s from the last encoder count to the first stop command.
+        ``turned_s``: time in s since the turn began. ``disturbed``: whether the network is
+        disturbed. If so, the driver does not learn from this turn.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -266,10 +268,12 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from the last turn if that turn was slow and this turn is fast.
+        """Forget what was learned from the previous turn, if that was slow and this turn is fast.
 
-        In that case, something held the robot in the last turn. If this turn is slow, store what is
-        known before the driver learns from it, so that the next turn can undo this lesson.
+        In this case, something held the robot in the previous turn.
+
+        If this turn is slow, something may hold the robot now. So store what the driver knows
+        before it learns from this turn. The next call can then restore this knowledge.
 
         ``part``: this turn's measured rate divided by its commanded rate.
         """

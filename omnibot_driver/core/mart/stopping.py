@@ -23,7 +23,8 @@ from omnibot_driver.core.mart.words import (
 
 REPEAT_S: Final = 0.3
 ROUNDS: Final = 3
-"""Number of stops that the driver sends to the command port before it uses the stop port."""
+"""Number of stop commands that the driver sends to the command port before it uses the stop
+port."""
 STOP_PORT_TIMES: Final = 3
 ANSWERS: Final = {
     Motion.REFERENCE: (Form.NOTHING,),
@@ -31,9 +32,9 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""For each motion, the forms of an ``ok`` reply that reports the end of the motion."""
+"""Forms of the reply ``ok`` that report the end of a motion, by motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s from the first stop of a controlled move until the driver queries the server's name.
+"""Time in s from the first stop command for a controlled move to the query of the server's name.
 
 By that time, the move has usually ended.
 """
@@ -51,11 +52,12 @@ turn, the server gives up later, because it waits 0.75 s for the robot to stop.
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
-    """Return whether a motion failed only because the wheels turned too long after its end.
+    """Return whether a motion failed only because the wheels turned too long after the motion.
 
-    In this case, the motors are off. For a controlled turn, the server may report this failure with
-    the text for a turn that has not begun. A turn of more than ``NO_START_S`` has certainly begun,
-    so then this text means that the wheels turned too long.
+    After this failure, the motors are off. If the motion is a controlled turn, the server may
+    report the failure with the text for a turn that has not begun. But a turn that lasted longer
+    than ``NO_START_S`` has certainly begun. In such a turn, the text means that the wheels turned
+    too long.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """
@@ -70,8 +72,8 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of earlier requests that are not answered yet, and whose replies would look
-    like a reply to the stop.
+    ``owed``: number of earlier requests whose replies are still missing. Only requests are counted
+    whose replies look like a reply to a stop command.
 
     ``move``: the controlled move to stop, or None. The reply to the move itself ends the stop.
 
@@ -95,7 +97,7 @@ class Stopping:
         self.result: Ok | Fail | None = None
         """The reply that shows how the motion ended, or None."""
         self.began: bool | None = None
-        """Whether the motion had begun; None if the replies do not show it."""
+        """Whether the motion had begun before the stop; None if the replies do not show it."""
         self.wake_at = now
         self.last_port = 0
         """Number of times that the stop port was used as the last resort."""
@@ -140,7 +142,7 @@ class Stopping:
 
     @property
     def failed(self) -> bool:
-        """Whether the stops on both ports have remained unanswered."""
+        """Whether the stop commands on both ports have remained unanswered."""
         return self.last_port >= STOP_PORT_TIMES
 
     def hear(self, reply: Reply, now: float) -> bool:
@@ -170,16 +172,16 @@ class Stopping:
         return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
     def doubt(self, reply: Ok, *, likely: bool = True) -> None:
-        """Record a reply that may belong to the stop, but may also be late or a copy.
+        """Record a doubtful reply: it answers the stop command, or it is late or a copy.
 
-        ``likely``: whether the number in the reply is plausible for a reply to the stop.
+        ``likely``: whether the number in the reply is plausible for a reply to the stop command.
         """
         if reply.form in ANSWERS.get(self.motion, ()):
             self._doubtful.append((reply, likely))
 
     @property
     def doubtful_result(self) -> Ok | None:
-        """The doubtful reply that is probably the reply to the stop, or None.
+        """The doubtful reply that is probably the reply to the stop command, or None.
 
         It is None if there are at most ``owed`` doubtful replies, because all of them may be late
         replies to earlier requests. If there are more, it is the last doubtful reply with a

@@ -2,8 +2,9 @@
 
 """The reasons to stop a motion, and the stop itself.
 
-Uncertain behaviour is a reason too. This module knows the wanted command, measurements and the stop
-commands; it does not know how a motion begins. The caller passes the time.
+A motion is also stopped if the driver does not know what the robot does. This module knows the
+wanted command, measurements and the stop commands; it does not know how a motion begins. The caller
+passes the time.
 """
 
 import math
@@ -33,7 +34,7 @@ BLIND_S, TRIPS = 0.8, 5
 It is BLIND_S (s), plus TRIPS times the average duration of an exchange.
 """
 FROZEN_S, FROZEN_TIMES = 0.5, 3
-"""Limits of a constant heading. If both limits are reached, the driver stops the robot.
+"""Limits for a heading that stays constant. If both are reached, the driver stops the robot.
 
 The IMU may then be dead, or the robot stuck.
 
@@ -44,7 +45,7 @@ added to this limit.
 replies may be equal by chance.
 """
 NO_START_S: Final = 1.5
-"""Time in s after a start within which the robot must begin to move."""
+"""Longest time in s from the start of a motion until the robot must move."""
 LATE: Final = " while the robot drives: check the network"
 STUCK: Final = (
     "the robot is commanded to move, but does not move: check motors, wheels and power, and"
@@ -154,7 +155,7 @@ class Stops(Ground, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command, unless the driver already refuses this motion.
+        the user's command. If the driver already refuses this motion, the command is kept.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """
@@ -291,11 +292,11 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Evaluate a reply that came after the driver has used the stop port.
 
-        If this reply answers a stop, the server's stop port still waits for the end of the motion.
-        It could hang the next forward drive (RM); see docs/boards/mart.md.
+        If this reply answers a stop command, the server's stop port still waits for the end of the
+        motion. The stop port could hang the next forward drive (RM); see docs/boards/mart.md.
 
-        A reply with a number is not a sign of this. It answers an earlier query, or the stop of a
-        turn on the spot, which leaves the stop port free.
+        A reply with a number does not show that the stop port waits. Such a reply answers an
+        earlier query, or the stop command of a turn on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return
@@ -316,7 +317,7 @@ class Stops(Ground, ABC):
 
     @abstractmethod
     def _learn_standing(self) -> None:
-        """Record that the motor units now in use are too small to turn the motors."""
+        """Record that the present motor units are too small to turn the motors."""
 
     @abstractmethod
     def _ask_what_moves(self, now: float) -> None:

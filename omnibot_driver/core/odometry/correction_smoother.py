@@ -62,7 +62,9 @@ class CorrectionSmoother:
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Move ``pose`` towards ``target``, by the part of the correction due after ``seconds``.
+        """Move ``pose`` towards ``target``, by a part of the correction.
+
+        ``seconds``: duration of this step. It determines how large the part is.
 
         In this step, the robot can have moved only by a certain distance and angle. ``move`` has
         used a part of them, and the correction uses at most the remainder.

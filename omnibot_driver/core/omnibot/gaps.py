@@ -38,22 +38,22 @@ TICK_BYTES: Final = 14 + 9 + 15
 """Largest number of bytes that the board sends in one tick (10 ms). If more bytes come in a read
 after a pause, the read was late."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses between frames from which on the board is regarded as their cause.
+"""Number of pauses between frames that shows that the board makes the pauses.
 
-With fewer pauses, an adapter may be the cause.
+After fewer pauses, an adapter may still be the cause.
 """
 
 _FIRST: Final = attrgetter("first")
 
 
 class InterFrameGaps:
-    """The pauses within the bytes held, and where the pauses of this line normally are.
+    """The pauses within the bytes that the decoder holds, and what is known of this line's pauses.
 
     * ``byte_s``: time in s that the line takes for a byte.
     * ``sharp``: whether the first byte after a pause normally begins a frame.
     * ``between``: whether the read after a pause normally contains the beginning of a frame.
-    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. If so, further
-      confirmations are not counted.
+    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
+      further confirmations are not counted.
     * ``at_pace``: whether the line was not idle between the previous read and the last one.
     * ``collected``: whether an adapter collected the bytes of the last read for more than a tick.
     """
@@ -74,7 +74,7 @@ class InterFrameGaps:
         """Record a read of ``arrived`` bytes, and the pause before it if the line was idle.
 
         ``pause_s``: time in s since the previous read. ``place``: position of the first new byte
-        among the bytes held. ``now``: time of the read in s.
+        among the bytes that the decoder holds. ``now``: time of the read in s.
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
@@ -112,9 +112,9 @@ class InterFrameGaps:
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Check whether the pauses among the bytes held are between accepted frames.
+        """Check whether the pauses are between accepted frames.
 
-        ``ends``: the position after each accepted frame, among the bytes held.
+        ``ends``: the position after each accepted frame, among the bytes that the decoder holds.
         """
         start = 0
         for end in ends:
@@ -135,7 +135,7 @@ class InterFrameGaps:
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
         """Return whether only later bytes can show the cause of a pause in ``data[start:end]``.
 
-        The result is False if an idle line certainly caused another pause in these bytes.
+        The result is False if one of the pauses in these bytes certainly comes from an idle line.
         """
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
@@ -145,9 +145,9 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether the bytes from ``start`` on came within half a tick, just after a pause.
+        """Return whether the bytes from ``start`` on came just after a pause, within half a tick.
 
-        The pause must not be longer than ``LATE_S``.
+        If the pause was longer than ``LATE_S``, the result is False.
         """
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
@@ -156,7 +156,7 @@ class InterFrameGaps:
         return False
 
     def forget(self, count: int) -> None:
-        """Forget the pauses within the first ``count`` bytes, which are not held any more."""
+        """Forget the pauses in the first ``count`` bytes, which the decoder does not hold now."""
         if not self.gaps or self.gaps[-1].first < count:
             self.clear()
             return
@@ -169,7 +169,7 @@ class InterFrameGaps:
         self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
 
     def clear(self) -> None:
-        """Forget all pauses among the bytes held, and the times of all reads."""
+        """Forget all pauses in the bytes that the decoder holds, and the times of all reads."""
         self.gaps, self._reads = [], []
 
     def _within(self, start: int, end: int) -> Iterator[Gap]:

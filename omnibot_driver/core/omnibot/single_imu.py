@@ -30,7 +30,9 @@ Piece = tuple[bytes, float]
 def is_begun(
     pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
 ) -> bool:
-    """Return whether the pieces and ``data`` together are an incomplete IMU frame that is due.
+    """Return whether ``pieces`` and ``data`` together are an incomplete IMU frame that is due.
+
+    ``pieces``: the earlier reads of this frame; may be empty. ``data``: the newest read.
 
     If ``GAP_S`` or more has passed since the first piece, return False, because only the decoder
     can judge a pause within a frame.
@@ -55,7 +57,9 @@ def joined(pieces: list[Piece]) -> bytes:
 def take_pieces(
     pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
 ) -> ImuReading | None:
-    """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
+    """Return the reading of the IMU frame that consists of ``pieces`` and ``data``.
+
+    ``pieces``: the earlier reads of this frame, at least one. ``data``: the newest read.
 
     Return None and change nothing if the frame is not accepted, if a byte may be lost, or if
     ``GAP_S`` has passed since the first piece.
@@ -86,8 +90,9 @@ def take_single(
 ) -> ImuReading | None:
     """Return the reading of ``data`` if it is one IMU frame that was due, with usual content.
 
-    Otherwise return None and change nothing. ``first``: number of bytes in the first piece of
-    ``data``. ``now``: arrival time of this piece in s.
+    Otherwise return None and change nothing. ``data`` may have come in several reads (pieces).
+
+    ``first``: number of bytes in the first piece. ``now``: arrival time of the first piece in s.
 
     If ``data`` came in pieces, the caller must have checked whether the last byte may belong to the
     next header.

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Computes sampling times from arrival times: the board's clock, as seen by the host's clock.
+"""Computes sampling times, by the host's clock, from arrival times.
 
-Ticks are counted. ``ClockFit``, the *fitted clock*, gives their times. One constant error remains:
-the smallest delay that ever occurs. docs/internals/time.md explains why.
+The board's ticks are counted. ``ClockFit``, the *fitted clock*, converts a tick's number to a time.
+One constant error remains: the smallest delay that ever occurs. docs/internals/time.md explains
+why.
 
 This module knows readings and times; it reads no clock and does not know any board's bytes.
 """
@@ -42,13 +43,13 @@ between two ticks, it is uncertain to which tick a read belongs.
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period.
 
-A new fit can make the fitted clock later. The stamps then approach it slowly.
+A new fit can make the times of the fitted clock later. The stamps then approach these times slowly.
 """
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times do not allow a larger step."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
-"""The place in the board's data at which a read ended, if its last sample is complete."""
+"""The place in the board's data at which a read ended that contains only complete samples."""
 
 
 class DeviceClock:
@@ -186,7 +187,8 @@ class DeviceClock:
     def _count(self, readings: Sequence[Reading]) -> list[int]:
         """Return the tick number of each reading.
 
-        Lost readings are counted too. The counter in the displacements corrects the number.
+        Lost readings are counted too. If the board's counter in a displacement shows another
+        number of ticks, the tick number is corrected.
         """
         ticks: list[int] = []
         for reading in readings:
@@ -201,7 +203,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return how many more ticks the displacement's counter shows than were counted so far."""
+        """Return how many ticks the tick number lacks, by the counter in the displacement."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -278,10 +280,12 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set a tick's stamp by the fitted clock, but limit the step from the last stamp.
 
+        The smallest step is half a period, or ``room_s`` if that is shorter.
+
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: largest allowed value, in s, for the smallest step from the last stamp. Stamps
-        must not be later than the arrival, so time must be left for the other stamps of this read.
+        ``room_s``: time in s that is left for this step. Stamps must not be later than the arrival,
+        so the other stamps of this read need time, too.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -1,8 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Supervision of a motion in progress, 100 times a second. It works like that of the real server.
+"""Supervision of a motion in progress, 100 times a second.
 
-It detects that the robot starts, stops or comes near an obstacle, and it ends controlled moves.
+It works like the supervision in the real server. It detects that the robot starts, stops or comes
+near an obstacle, and it ends controlled moves.
+
 This module knows motions; it does not know commands.
 """
 

@@ -2,8 +2,8 @@
 
 """Positional control: driving to a commanded pose.
 
-The manual describes only the switch; everything else is assumed. This module knows the units and
-the speed. It must not know wheels.
+The manual describes only the switch that selects positional control; everything else is assumed.
+This module knows the units and the speed. It must not know wheels.
 """
 
 from math import cos, hypot, sin

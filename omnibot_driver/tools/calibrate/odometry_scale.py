@@ -86,7 +86,7 @@ class Ratio:
 
     @property
     def value_sigma(self) -> float:
-        """Standard deviation of ``value``, the user's measurement divided by the odometry's."""
+        """Standard deviation of ``value``, the ratio of the two measurements."""
         return self.sigma / abs(self.told)
 
 
@@ -194,7 +194,7 @@ def result(
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw, for each drive, the user's measurement divided by the odometry's."""
+    """Draw, for each drive, the user's measurement divided by the odometry's measurement."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

@@ -61,7 +61,8 @@ Records = dict[str, list[Column]]
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Record the wheels, fit their plants, tune their gains, and measure the effect.
 
-    Raises ToolError if a record or a fit fails. The tool first tries to restore the parameters.
+    Raises ToolError if a record or a fit fails. Before that, the tool tries to restore the
+    parameters.
     """
     goals = Goals(
         overshoot=arguments.overshoot / 100,
@@ -126,7 +127,10 @@ class _Bench:
         self.robot.rest(WRITTEN_WITHIN_S)
 
     def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
-        """Record ``count`` starts from standstill; return the times between ticks of each start."""
+        """Record ``count`` starts from standstill.
+
+        Return, for each start, the times between the encoder ticks.
+        """
         found: Records = {side: [] for side in SIDES}
         for _ in range(count):
             for side, column in read(self.robot.record("record_rpm", topic, command)).items():
@@ -138,7 +142,7 @@ class _Bench:
     def steps(self, rpm: Sequence[float]) -> Records:
         """Record several steps of the set-point from rest to the wheel speeds ``rpm``.
 
-        Return, for each step, the times between the ticks.
+        Return, for each step, the times between the encoder ticks.
         """
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)

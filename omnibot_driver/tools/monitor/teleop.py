@@ -12,10 +12,11 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
-"""Time in s for which a newly pressed key moves the robot. Keyboards begin to repeat after 0.25 s
-to 0.6 s."""
+"""Time in s for which a newly pressed key moves the robot. Within this time, a keyboard begins to
+repeat the key: it does so after 0.25 s to 0.6 s."""
 REPEAT_S: Final = 0.3
-"""Time in s for which a repeated key moves the robot. Several repetitions may be lost or late."""
+"""Time in s for which a repeated key moves the robot. So the robot keeps moving if several
+repetitions are lost or late."""
 ASLEEP_S: Final = 0.5
 """Longest time in s between two calls of ``command`` while the program runs.
 
@@ -23,7 +24,7 @@ After a longer time, the user or the computer has probably suspended the program
 or during the suspension are discarded.
 """
 DEAF_S: Final = 0.3
-"""Time in s after a suspension of the program in which keys do not steer.
+"""Time in s for which keys do not steer after the program was suspended.
 
 Keys that were pressed during the suspension still arrive in this time.
 """

@@ -37,7 +37,10 @@ def settled(firmware: Firmware) -> Rig:
 
 
 def test_the_boards_own_odometry_would_be_wrong() -> None:
-    """The board's own odometry misses over 15 % of a straight drive. The driver does not use it."""
+    """In a straight drive, the board's own odometry lacks more than 15 % of the distance.
+
+    The driver does not use the board's odometry. Its own odometry lacks less than 5 %.
+    """
     rig = settled("firmware")
     rig.order(20, 20, 8.0)
     board = rig.board.odometry.pose
@@ -116,7 +119,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
     """The displacements in all odometry estimates add up to the driven distance, within 3 %.
 
-    Between two estimates, the pose moves at most as far as at a speed of 1 m/s, plus 3 cm.
+    From one estimate to the next, the pose moves by less than 3 cm plus the time times 1 m/s.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
@@ -200,10 +203,10 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """Between two tick reports, the odometry predicts motion, and then the user changes a setting.
+    """After a tick report, the odometry predicts motion, and then the user changes a setting.
 
-    The second tick report also counts the predicted motion. The pose contains this motion only
-    once.
+    The next tick report contains the motion that was already predicted. The pose contains this
+    motion only once.
     """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
@@ -300,7 +303,7 @@ def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     """
 
     def variance() -> float:
-        """Return the variance of a predicted speed in (m/s)², after a report with 4 extra ticks."""
+        """Return a predicted speed's variance in (m/s)², after a report with 4 ticks too many."""
         odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
         odometry.wrote(SetRpm(20, 20), 0.0)
         for step in range(52):

@@ -48,7 +48,10 @@ def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield the positions of the lost characters: each choice of at most ``most`` of ``length``."""
+    """Yield each possible loss of up to ``most`` characters from a text of ``length`` characters.
+
+    A loss is given by the positions of the lost characters.
+    """
     for count in range(most + 1):
         yield from combinations(range(length), count)
 
@@ -103,7 +106,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """A motion line and the LED's line together lose as many characters as one line has.
+    """Adjacent characters of a motion line and the LED's line are lost, as many as a line has.
 
     If the motion line comes first, the remaining characters may be a wrong motion line. To prevent
     this, the driver sends the LED's line at least 15 ms after a motion line. If the LED's line

@@ -69,9 +69,9 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """After a reconnect, the robot starts backward between the first two odometry reports.
+    """A robot starts backward just after a reconnect, and the covariance still stays finite.
 
-    The covariance stays finite.
+    The start is between the first two odometry reports of the new connection.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)
@@ -106,8 +106,8 @@ def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
 ) -> None:
     """After a silence of 12 s, the tick counters are at zero.
 
-    If the board's clock continued during the silence, the wheels have rolled back. If it began
-    again, the board has restarted.
+    If the board's clock continued during the silence, the wheels have rolled back. If the clock is
+    near zero too, the board has restarted.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

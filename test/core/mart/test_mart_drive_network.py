@@ -52,7 +52,7 @@ def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
 ) -> None:
     """A tenth of all datagrams is lost each way.
 
-    The driver stops the robot only if RM, which starts the drive, is not answered.
+    The driver stops the robot in one case only: RM, which starts the drive, is not answered.
     """
     bench = on(NetworkFaults(lose=0.1), firmware, seed)
     bench.command(0.3, 0.0, 10.0)

@@ -76,9 +76,9 @@ def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
-    """Let the network deliver the next move with this command, and its copy ``later_s`` later.
+    """Let the network deliver the next ``word`` command twice, the copy ``later_s`` later.
 
-    Return a list to which the move is added when it is sent.
+    Return a list to which this command is added when it is sent.
     """
     path = bench.robot.network[0].to_board
     real, moves = path.send, list[bytes]()

@@ -14,9 +14,10 @@ pytestmark = pytest.mark.slow
 def outlived(
     firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
 ) -> MartBench:
-    """Return a bench with a stop port that hangs.
+    """Return a bench whose server has a stop port that hangs.
 
-    The IMU died in a motion, so the driver used the stop port. Now the IMU works again.
+    The IMU died in a motion, so the driver used the stop port. The stop port hangs since then. Now
+    the IMU works again.
     """
     bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
     bench.command(*motion, 2.5)
@@ -204,9 +205,10 @@ def test_the_e_stop_stops_a_robot_while_the_driver_asks_what_moves() -> None:
 
 
 def test_the_e_stop_repeats_the_stop_of_a_lost_server_at_once() -> None:
-    """The server hangs in the stop of RM. The driver repeats SRM once a second.
+    """The server hangs in SRM, the stop command of a forward drive (RM).
 
-    The e-stop does not wait for the next repetition.
+    The driver repeats SRM once a second. After an e-stop, it sends SRM at once, and does not wait
+    for the next repetition.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.1, 2.5)

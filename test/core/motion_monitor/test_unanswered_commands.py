@@ -58,9 +58,10 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 @pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The robot does not obey a command, then it obeys one, and then it does not obey again.
+    """A robot that does not obey is reported again, if it has obeyed since the first notice.
 
-    It does not obey while the line to the board is cut. A notice appears in both of these cases.
+    The user drives three times. The first and the third time, the line to the board is cut, so the
+    robot does not obey. Each of these two drives gives a notice.
     """
     bench = standing()
     for hears in (False, True, False):
@@ -77,7 +78,8 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
     """The user commands 1 mm/s, and then a zero speed. No notice appears.
 
-    Neither command can show whether the robot obeys: 1 mm/s is within the noise.
+    Neither command can show whether the robot obeys. A motion of 1 mm/s is within the noise, and a
+    robot at rest fulfils a zero speed in any case.
     """
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)
@@ -89,9 +91,9 @@ def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> No
 
 
 def test_in_imu_only_mode_nothing_is_found() -> None:
-    """In IMU-only mode, no displacements come that could be compared with the commands.
+    """In IMU-only mode, the board sends no displacements to compare with the commands.
 
-    The monitor does not trip.
+    So the motion monitor does not trip.
     """
     bench = Bench(BoardSettings(running=True, imu_only=True, linear_scale=70 / 2.38))
     bench.open()

@@ -2,8 +2,9 @@
 
 """Tests that an IMU frame is returned as soon as the packet with its last byte arrives.
 
-The tests use adapters that split the bytes into packets in different ways. If an IMU frame ends
-like a header, the arrival times show whether another frame is due.
+The tests use adapters that split the bytes into packets in different ways. An IMU frame can end
+with bytes that look like the next header. The decoder then uses the arrival times to find whether
+another frame is due.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,7 +26,8 @@ IMU_LENGTH = 14
 DRIFT = 1.0002
 """Real period of the adapter's timer by the board's clock, divided by its nominal period.
 
-The difference makes the adapter's packets end at all phases of a tick, one phase after the other.
+Because the two periods differ, the adapter's packets end at all phases of a tick, one phase after
+the other.
 """
 
 Handed = Iterator[tuple[float, bytes]]
@@ -97,7 +99,7 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_an_empty_read_changes_nothing() -> None:
-    """After each read, the board gets an empty read. The readings are the same as without it."""
+    """An empty read after each read does not change the readings."""
     one, other = OmniBot(OmniBotSettings()), OmniBot(OmniBotSettings())
     for now, data in islice(pieces(), TICKS):
         assert one.receive(data, now) == other.receive(data, now)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the sum of all delays from sampling to reading. Texts and pauses add no delay to it."""
+"""Tests of the sum of all delays from sampling to reading.
+
+The board's texts, and the time in which the board is paused, add nothing to this sum.
+"""
 
 import pytest
 from session_bench import TICK_S, Bench

@@ -93,7 +93,7 @@ def test_the_twist_is_the_derivative_of_the_pose() -> None:
 
 
 def test_a_force_moves_the_robot_in_its_direction() -> None:
-    """A force along x or y, or one that turns the robot, moves it in that direction only."""
+    """A force along x or y moves the robot along this axis only. A torque only turns the robot."""
     for force, moved in (((500.0, 0.0, 0.0), 0), ((0.0, 500.0, 0.0), 1), ((0.0, 0.0, 500.0), 2)):
         world = World(BoardSettings())
         world.force = Force(*force)

@@ -22,12 +22,10 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets after which a replay has recognised the Teensy on a line.
+"""Number of packets that a recording needs from each Teensy, so that a replay recognises it.
 
-A Teensy needs at least 1 s to send this number of packets.
-
-A recording may lack the answers to the driver's first questions. In that case, a replay recognises
-the Teensys only by later packets.
+A recording may lack a Teensy's answers to the driver's first questions. Then the replay recognises
+the Teensy only by later packets. A Teensy sends this number of packets in 1 s or more.
 """
 
 

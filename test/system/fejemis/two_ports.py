@@ -65,7 +65,10 @@ class TwoPorts(InBatches[SimulatedFejemis]):
             self._terminals[channel] = Terminal(self.ports[channel])
 
     def unplug(self, channel: int) -> None:
-        """Close the terminal, as if the cable were unplugged. The Teensy keeps its last command."""
+        """Close the pseudo-terminal of a channel, as if the cable were unplugged.
+
+        The Teensy keeps its last command.
+        """
         with self._plugging:
             terminal, self._terminals[channel] = self._terminals[channel], None
             if terminal is not None:

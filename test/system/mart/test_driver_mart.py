@@ -29,7 +29,7 @@ Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
 SECOND_TICKS: Final = 500
 STANDS_TICKS: Final = 400
-"""``STANDS_TICKS`` is the number of the controller's ticks in 0.8 s, ``SECOND_TICKS`` in 1 s."""
+"""Numbers of the controller's ticks: ``SECOND_TICKS`` in 1 s, ``STANDS_TICKS`` in 0.8 s."""
 MOTIONS: Final = {
     "RM": (0.3, 0.2),
     "B": (-0.2, 0.0),
