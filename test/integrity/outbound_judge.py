@@ -181,7 +181,7 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """End the scene. Return whether one of the arguments is True.
+        """End the scene. Return whether the robot drove for too long.
 
         ``driven_when_due``: whether the robot still drove at the time at which it had to be at
         rest. ``driven``: whether it still drove at the end.

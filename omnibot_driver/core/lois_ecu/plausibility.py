@@ -110,8 +110,8 @@ class Gate(Generic[Group]):
 class TicksGate(Gate[Ticks]):
     """Check of the reports of encoder ticks. ``ticks_per_revolution`` may be replaced at any time.
 
-    The times in the reports show whether the board's clock counts ms or ns. Later reports must
-    agree.
+    The times in the reports show whether the board's clock counts ms or ns. Later reports must show
+    the same unit.
 
     ``too_fast``: number of reports in a row that were rejected although their clock is plausible:
     their counts show a speed that no wheel can have.

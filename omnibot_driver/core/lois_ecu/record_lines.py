@@ -2,7 +2,7 @@
 
 """Assembly of a requested record from its lines. An incomplete record is discarded.
 
-This module works on lines, without characters and times.
+This module works on text lines. It does not know characters or times.
 """
 
 from dataclasses import dataclass
@@ -26,11 +26,12 @@ RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 class GroupStatistics:
     """Counters of groups and records since this object was created.
 
-    ``damaged_groups``: discarded groups and records. ``damaged_records``: the records among them.
+    ``damaged_groups``: number of discarded groups and records. ``damaged_records``: number of
+    discarded records alone.
 
-    ``implausible``: complete groups with values that are not plausible.
+    ``implausible``: number of complete groups with values that are not plausible.
 
-    ``unknown_lines``: valid lines that are not a report.
+    ``unknown_lines``: number of valid text lines that are not a report.
     """
 
     damaged_groups: int = 0

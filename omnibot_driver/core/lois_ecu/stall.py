@@ -116,8 +116,8 @@ class StallWatch:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
         At least ``AT_LEAST`` reports must show the standstill. For a wheel commanded backward, at
-        least ``AT_LEAST_BACKWARD`` reports must show it. After the result was True for one wheel,
-        the times and the reports of both wheels are counted from zero again.
+        least ``AT_LEAST_BACKWARD`` reports must show it. If a wheel is returned as stalled, the
+        times and the reports of both wheels are counted from zero again.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)

@@ -102,7 +102,7 @@ class Reckoning(CorrectedPose):
         self.heading.may_begin_anew = True
 
     def begin(self, motion: Motion, now: float) -> None:
-        """Record that a motion was started; its encoder count begins at zero."""
+        """Record that the driver has started a motion. Its encoder count begins at zero."""
         if motion is not Motion.REFERENCE and self.heading.from_s < self._stood_s:
             self.heading.forget()  # on some servers, the last motion has changed the heading
         self.motion, self.stands = motion, False
@@ -126,12 +126,12 @@ class Reckoning(CorrectedPose):
         self.heading.changed_s = now
 
     def refused(self) -> None:
-        """Record that the server knows of no motion, although a start was sent."""
+        """Record that the server knows of no motion, although the driver sent a start command."""
         if self.wheel.refused():
             self.lose_turn()
 
     def stopping(self, now: float) -> None:
-        """Record that a stop was sent to the robot."""
+        """Record that the driver has sent a stop command."""
         if self.slowing_since_s is None:
             self.slowing_since_s = now
 

@@ -66,7 +66,7 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 the wheel measured.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Largest accepted difference between the angle in the reply to a stop and the expected turn.
+"""Largest accepted difference between the angle in a reply to a stop command and the expected turn.
 
 If the difference is larger, the number in the reply may be an encoder count instead of an angle.
 The limit is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the angle by which the
@@ -86,9 +86,8 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn. After a request SSP, which sets the motor units of the
-    next turn, ``units`` has the units of the next turn. At the beginning of a connection, ``units``
-    is 0.
+    ``units``: motor units of the last turn, or those that the last request SSP has set for the next
+    turn. It is 0 at the beginning of a connection.
 
     ``seen_radps``: measured rate of the last turn, in rad/s.
 
@@ -209,7 +208,7 @@ class SpotTurns:
         return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
     def _is_held(self, seen_radps: float) -> bool:
-        """Return whether something holds the robot: the driver must not learn from its rate."""
+        """Return whether something holds the robot. Then the driver must not learn the rate."""
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:

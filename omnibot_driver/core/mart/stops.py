@@ -45,7 +45,7 @@ added to this limit.
 replies may be equal by chance.
 """
 NO_START_S: Final = 1.5
-"""Longest time in s from the start of a motion until the robot must move."""
+"""Longest allowed time in s from the start of a motion until the robot moves."""
 LATE: Final = " while the robot drives: check the network"
 STUCK: Final = (
     "the robot is commanded to move, but does not move: check motors, wheels and power, and"
@@ -205,7 +205,7 @@ class Stops(Ground, ABC):
         return packets
 
     def _stopped(self, now: float) -> None:
-        """End a stop that the server has answered, and evaluate the result of the stop."""
+        """End the stop of a motion after the server's answer; evaluate how the motion ended."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # the move was cut short
         self.conversation.settle(now)

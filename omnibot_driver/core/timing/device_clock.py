@@ -49,7 +49,7 @@ SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times do not allow a larger step."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
-"""The place in the board's data at which a read ended that contains only complete samples."""
+"""Boundary of a read that ends with a complete sample."""
 
 
 class DeviceClock:

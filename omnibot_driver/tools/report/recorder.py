@@ -196,7 +196,8 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Return the spans of time in which the text of a topic's value stayed the same.
 
-        ``name``: function that converts a value to a text. This text is the span's ``what``.
+        ``name``: function that converts a value to a text. The field ``what`` of a span has this
+        text.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

@@ -119,7 +119,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
     """The displacements in all odometry estimates add up to the driven distance, within 3 %.
 
-    From one estimate to the next, the pose moves by less than 3 cm plus the time times 1 m/s.
+    Between two estimates, the pose moves at less than 1 m/s, with a tolerance of 3 cm.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)

@@ -38,7 +38,7 @@ class Outcome(NamedTuple):
 
     ``ended``: whether the robot rests at the end, and the server answers.
 
-    ``stop_s``: the longest time from a stop to standstill.
+    ``stop_s``: the longest time from a stop of the driver to a standstill of the robot.
 
     ``way_m``: the driven distance.
     """

@@ -57,11 +57,11 @@ STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """Commands that the server executes when the driver starts, one in each trial; empty for none."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Durations in s of the network's first interruption, at the driver's start. A trial uses one."""
+"""Durations in s of the network's first interruption, which begins with the driver."""
 BACK_S: Final = (0.2, 0.7, 30.0)
 """Times in s from the end of the first interruption of the network to the start of the second.
 
-Each trial uses one of them. The second interruption lasts 1 s. After 30 s, the trial is over.
+The second interruption lasts 1 s. After 30 s, the trial is over, so it has only one interruption.
 """
 ENDS_S, SETTLED_S = 16.0, 1.5
 
@@ -190,9 +190,9 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials in which a user commands ``wishes``, and one datagram is disturbed.
 
-    A first run without faults shows how many datagrams there are in each direction. Then each of
-    the first datagrams of a direction has the four fates, in one trial for each fate. These are at
-    most ``MOST_DATAGRAMS`` datagrams for each wish.
+    A first run without faults shows how many datagrams there are in each direction. Then the first
+    datagrams of each direction are disturbed, at most ``MOST_DATAGRAMS`` for each wish. There is
+    one trial for each of these datagrams and each of the four fates.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

@@ -80,7 +80,7 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
 
 @pytest.mark.parametrize(("firmware", "seed"), [("firmware", 5), ("source", 14)])
 def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, seed: int) -> None:
-    """Replies are late. In each of these drives, two headings in a row are equal by chance.
+    """Replies are late, so two headings in a row are equal by chance in each drive of this test.
 
     Only three equal headings show a dead IMU, so the driver does not report a dead IMU.
     """
@@ -115,7 +115,7 @@ def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
 def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: bytes) -> None:
     """The first start command is lost, but the server answers HELLO: it has not been restarted.
 
-    The driver soon sends the start again, so the robot moves within 1.5 s.
+    The driver soon sends the start command again, so the robot moves within 1.5 s.
     """
     bench = on(NetworkFaults(), firmware)
     path = bench.robot.network[0].to_board
@@ -127,7 +127,8 @@ def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: b
 def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
     """The server does not receive the start command, nor any other datagram for 0.5 s.
 
-    It may have been restarted, so the driver waits for 1.5 s before it sends a start again.
+    The server may have been restarted. So the driver waits for 1.5 s before it sends a start
+    command again.
     """
     bench = on(NetworkFaults(), "firmware")
     network, away_s = bench.robot.network[0], math.inf

@@ -149,7 +149,7 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """The robot drives half as far as requested. Queries are lost for 0.7 s after the move.
 
-    The driver sends a stop, because a second run is possible. It does not know how far this robot
+    The driver sends a stop command: a second run is possible. It does not know how far this robot
     drives in one run, so it adds nothing to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()

@@ -16,8 +16,8 @@ def outlived(
 ) -> MartBench:
     """Return a bench whose server has a stop port that hangs.
 
-    The IMU died in a motion, so the driver used the stop port. The stop port hangs since then. Now
-    the IMU works again.
+    The IMU died in a motion, so the driver used the stop port. The stop port has hung since then.
+    Now the IMU works again.
     """
     bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
     bench.command(*motion, 2.5)
@@ -94,8 +94,8 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 ) -> None:
     """A driver starts while the server executes RM or B, and the IMU has died.
 
-    The server hangs in the first stop, and the driver uses the stop port. When the IMU works again,
-    the driver refuses motion.
+    The server hangs in the first stop command, so the driver uses the stop port. When the IMU works
+    again, the driver refuses motion.
 
     ``wait_s``: time in s from the driver's start until the IMU works again.
     """
