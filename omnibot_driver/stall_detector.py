@@ -11,13 +11,17 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Time in s without a call of ``StallDetector.passed`` after which the process is regarded as
-stalled. It is a little shorter than the time after which the guard process stops the robot, so that
-the driver notices each stall in which the guard stops the robot."""
+"""Duration, in s, from which a pause between calls of ``StallDetector.passed`` is a stall.
+
+The guard process waits a little longer before it stops the robot. So the driver notices each stall
+in which the guard stops the robot.
+"""
 SETTLE_S: Final = 0.25
-"""Time in s for which commands are still refused after the end of a stall. The sender's clock is
-known only roughly, so a command that seems to be from this time may have been sent during the
-stall."""
+"""Time in s for which the driver still refuses commands after the end of a stall.
+
+The driver knows the sender's clock only roughly. A command may have been sent during the stall,
+although its stamp is a little later than the end of the stall.
+"""
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
 A command that seems to be older comes from a sender whose clock is wrong."""

@@ -62,9 +62,10 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 
 
 def padded(data: bytes, like: bytes) -> bytes:
-    """Return ``data`` with the padding bytes of ``like``, because rclpy may put any bytes there.
+    """Return ``data`` with its padding bytes replaced by those of ``like``.
 
-    Padding bytes follow the NUL of a string, up to the next multiple of eight bytes.
+    Padding bytes follow the NUL of a string, up to the next multiple of eight bytes. rclpy may put
+    any bytes there.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):
@@ -121,9 +122,9 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """The driver can use its own serializer, whatever the length of a frame name.
+    """The check at start accepts the driver's own serializer for frame names of any length.
 
-    The length decides how the numbers after the name are aligned.
+    The length matters, because it decides how the numbers after the name are aligned.
     """
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
@@ -201,6 +202,6 @@ def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> No
 def test_any_number_of_wheels_is_serialised_as_rclpy_does(wheels: Any) -> None:
     """The driver serializes a JointState with any number of wheels as rclpy does.
 
-    For a robot without wheels, the driver does not publish joint_states.
+    A robot without wheels is also tested, although the driver does not publish joint_states for it.
     """
     assert difference(MessageSettings.from_parameters(boards.check_all({}), wheels)) == ""

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
     """A port appears late, and the link opens it.
 
-    A link can also be closed before its port appears.
+    Another port never appears. Its link can be closed, too.
     """
     listener, ours = Listener(), session()
     name = str(tmp_path / "omnibot")
@@ -102,7 +102,7 @@ def test_an_unplugged_port_is_reported_and_ends_the_state(tmp_path: Path) -> Non
 
 
 def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too() -> None:
-    """A port opens while the link closes.
+    """The link begins to close while its port is still being opened.
 
     The link still writes a last Stop to this port, because the robot may follow an old command.
     """

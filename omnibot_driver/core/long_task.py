@@ -34,7 +34,9 @@ class LongTask:
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
         """Begin a task that fails after ``limit_s``. Raises RequestRefused during another task.
 
-        ``name``: the noun in messages, e.g. "recording". ``token``: identifies the answer.
+        ``name``: the noun in messages, e.g. "recording".
+
+        ``token``: an object that belongs to this task only. The task's answer contains it.
         """
         if self.active:
             raise RequestRefused(

@@ -13,7 +13,7 @@ else:
     from dataclasses import dataclass
 
     def value(*, frozen: bool, slots: bool) -> object:
-        """Return a ``dataclass`` decorator whose ``frozen`` holds for the type checker only."""
+        """Return a ``dataclass`` decorator. Only the type checker enforces ``frozen``."""
         return dataclass(slots=slots, unsafe_hash=frozen)
 
 

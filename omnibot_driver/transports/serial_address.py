@@ -105,7 +105,10 @@ def _no_terminal(url: str, parameter: str) -> str:
 
 
 def _owner(path: str) -> str:
-    """Return number and name of the process that has locked this file, in brackets; else empty."""
+    """Return number and name of the process that has locked the file ``path``, in brackets.
+
+    Return an empty text if no process has locked it, or if its name cannot be read.
+    """
     with contextlib.suppress(OSError, ValueError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"

@@ -36,7 +36,7 @@ class Bench:
 
     ``hears``: whether the board receives data.
 
-    ``obeys``: False for a recording in place of a board.
+    ``obeys``: False if the session replays a recording, which cannot follow commands.
 
     ``speaks``: whether the board sends data.
     """

@@ -62,9 +62,9 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
-    """The board was paused, so the first displacement after the pause has an unknown duration.
+    """The board was paused, so the duration of the first displacement is unknown.
 
-    The first estimate of the odometry still has a covariance of zero.
+    The driver knows nevertheless where odom begins: the first estimate has a covariance of zero.
     """
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)

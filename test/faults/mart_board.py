@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller in the fault campaign: datagrams on request, and blocking motions.
+"""The MART controller in the fault campaign. It sends only replies, and its moves block it.
 
-Some networks are worse than the driver assumes. The names of these cases begin with "beyond what
-is assumed".
+Some networks are worse than the driver assumes. The names of these cases begin with "beyond what is
+assumed".
 """
 
 import socket
@@ -25,7 +25,7 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 TICKS: Final = 5
-"""Ticks of the simulated controller in one tick of the campaign."""
+"""Number of time steps of the simulated controller in one time step of the campaign."""
 LATE_S: Final = 0.3
 """Longest delay of a datagram in each direction, in s. It equals ``network_delay``."""
 LOST_STOP_S: Final = 1.2
@@ -45,7 +45,7 @@ STRAY_S: Final = 2.5
 
 
 class Board(SimulatedMart):
-    """The simulated controller with the interface of the campaign."""
+    """The simulated controller, with the additional properties that the fault campaign uses."""
 
     def __init__(self, settings: MartSettings) -> None:
         super().__init__(settings)
@@ -57,16 +57,16 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """The bytes that the board has received, for the campaign: here, always empty.
+        """Always empty, in place of the bytes that the board has received.
 
-        If they were not empty, the campaign would require that the driver's last bytes are a stop.
-        After its last stop, the driver of a MART still sends queries.
+        From other boards, the campaign expects a stop as the last bytes. The driver of a MART still
+        sends queries after its last stop, so this check must not be made.
         """
         return b""
 
 
 class MartLine:
-    """A controller and a network, in place of a ``BreakableLine``."""
+    """A simulated controller on a network, with the interface of ``BreakableLine``."""
 
     tick_s = TICK_S
 
@@ -80,7 +80,7 @@ class MartLine:
         self.network(NetworkFaults())
 
     def network(self, faults: NetworkFaults) -> None:
-        """Simulate these faults of the network from now on."""
+        """Let the network have the faults ``faults`` from now on."""
         self._paths = [FaultyNetwork(faults, f"{self.board.tick} {n}") for n in (0, 1)]
 
     @property
@@ -122,7 +122,7 @@ def line_of(rig: Rig) -> Any:
 
 
 def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
-    """Stop publishing commands while the robot drives on a bad network with these faults.
+    """Stop publishing commands while the robot drives on a network with the faults ``faults``.
 
     The network may delay the stop by ``allowed_s``.
     """

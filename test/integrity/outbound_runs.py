@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Which outbound trials run (scenes, numbers and boards), and the scores of these trials."""
+"""Which outbound trials run, and their scores.
+
+The module chooses scenes, kinds of board, and the number of trials.
+"""
 
 import math
 import os
@@ -22,17 +25,20 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. Each script has other commands."""
 NEEDED: Final = 10_000
-"""Least number of trials for each receiver and each rate of lost bytes.
+"""Least number of trials for each kind of receiver and each rate of lost bytes.
 
-The trials are divided among all scenes that end a drive. With 1 byte in 100 lost, each of the three
-scenes in ``HURRIES`` has this number of trials by itself.
+These trials are divided among all scenes that end a drive. Only with 1 byte in 100 lost, each of
+the three scenes in ``HURRIES`` gets the whole number.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
 DRIVEN: Final = 150
-"""Number of trials of each script that only drives, so that no stop is judged."""
+"""Number of trials of each script that drives and does not stop. These trials judge no stop."""
 OTHER_TRIALS: Final = 20
-"""Number of trials of each script with a fault for which the report has no limits."""
+"""Number of trials of each script with one of the faults ``OTHERS``.
+
+The report has no limits for their results.
+"""
 ESTOPS: Final = ("e-stop", "goal", "exit")
 """Scenes in which it matters whether the board obeys an emergency stop."""
 BOOTS: Final = ("reset", "exit")
@@ -48,9 +54,10 @@ Scores = dict[tuple[str, str, str], Score]
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield the kinds of board on which a scene runs. All of them have the receiver ``receiver``.
+    """Yield a name and a kind of board, for each kind on which a scene runs.
 
-    Each item is a name and a kind of board. The scores of kinds with the same name are added.
+    All kinds have the receiver ``receiver``. Several kinds can have the same name; their scores are
+    added.
     """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
@@ -75,9 +82,10 @@ def one(
 ) -> tuple[Scores, int]:
     """Run one script with each fault on all boards.
 
-    Return the scores, and how often the driver's session ran.
+    Return the scores, and how many times the session of the driver was run for them.
 
-    ``share``: share of the usual number of trials. ``job``: name and seed of the scene.
+    ``share``: the number of trials, as a share of the usual number. ``job``: name and seed of the
+    scene.
     """
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))
@@ -104,9 +112,11 @@ def add(total: Scores, more: Scores) -> None:
 
 
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
-    """Return the sum of the scores of one fault.
+    """Return the sum of all scores of the fault ``fault``.
 
-    An empty ``receiver`` means all receivers. An empty ``scene`` means all except ``DRIVES``.
+    ``receiver``: only scores of this receiver; if empty, those of all receivers.
+
+    ``scene``: only scores of this scene; if empty, those of all scenes except ``DRIVES``.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():
@@ -117,9 +127,12 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 
 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
-    """Run all trials on all processors. Return the scores, and how often the driver's session ran.
+    """Run all trials on all processors.
 
-    ``share``: share of the usual number of trials. ``scripts``: number of scripts for each scene.
+    Return the scores, and how many times the session of the driver was run for them.
+
+    ``share``: the number of trials, as a share of the usual number. ``scripts``: number of scripts
+    for each scene.
     """
     jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
     total: Scores = {}

@@ -20,9 +20,9 @@ def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """The wheels of a robot turn more than twice as fast as commanded.
+    """The simulated drive of these tests can also show a stop by the motion monitor.
 
-    The monitor stops the robot.
+    The wheels of a robot turn more than twice as fast as commanded. The monitor stops the robot.
     """
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)

@@ -225,7 +225,8 @@ def test_the_parameter_file_is_that_of_the_board(
 ) -> None:
     """The argument ``board`` selects the parameter file.
 
-    Without this argument, a parameter file of the user can name the board.
+    Without this argument, the user may give a parameter file that sets the parameter ``board``. The
+    driver uses this board.
     """
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
@@ -272,9 +273,9 @@ def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]
 
 @needs_launch
 def test_an_empty_board_is_described_as_the_default_one(launch: Callable[..., Started]) -> None:
-    """The argument ``board`` is empty. The default board is described.
+    """A launch file that includes the driver's file may leave the argument ``board`` empty.
 
-    A launch file that includes the driver's file may leave this argument empty.
+    The description is then that of the default board.
     """
     path, *_ = launch("description.launch.py", "board:=")["xacro"]["arguments"]
     assert Path(path).resolve() == ROOT / "urdf/omnibot.urdf.xacro"

@@ -60,7 +60,7 @@ def driver_names() -> set[str]:
 
 
 def everything_under(key: str, tree: Any) -> Iterator[Any]:
-    """Yield all values that the key has in a tree, at any depth."""
+    """Yield each value that ``key`` has anywhere in a tree of dictionaries and lists."""
     if isinstance(tree, dict):
         if key in tree:
             yield tree[key]
@@ -177,7 +177,8 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
     """The sources of twist_mux are topics that the driver does not use.
 
-    Their timeout is the driver's command timeout, and their message type that of the driver.
+    Their timeout is the driver's command timeout. Their message type is the one that the driver
+    expects.
     """
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()

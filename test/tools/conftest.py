@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fixtures: a simulated robot for each test module, and a calibration's connection to it."""
+"""Fixtures: a simulated robot for each test module, and a connection to the robot's driver."""
 
 from collections.abc import Iterator
 
@@ -18,7 +18,10 @@ def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 @pytest.fixture
 def robot(rigged: Rig) -> Iterator[Robot]:
-    """Yield a calibration's connection to the robot, with the e-stop released."""
+    """Yield the connection of a calibration tool to the robot's driver.
+
+    The e-stop is released.
+    """
     with robot_of(rigged.driver) as robot:
         if robot._estop:
             robot.call("estop", False)

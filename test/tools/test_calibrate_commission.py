@@ -44,7 +44,8 @@ def test_the_whole_walk_finds_what_was_planted(
 ) -> None:
     """The robot has reversed axes, another delta frame and a turned IMU.
 
-    The tool finds them, although the user's first answer is impossible. A driver can load the file.
+    The tool finds all three, although the user's first answer is impossible. A driver can load the
+    calibration file that the tool writes.
     """
     with rig(
         tmp_path,
@@ -127,9 +128,11 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """One axis is reversed. The tool finds it, and notes that the signs mirror the robot.
+    """One axis is reversed. The tool finds the signs of the axes.
 
-    The answer "r" repeats the motion. An invalid answer repeats the question.
+    A note says that these signs describe a mirror image of the robot.
+
+    The answer "r" repeats the motion. After an invalid answer, the tool asks again.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

@@ -110,10 +110,9 @@ class Encoder(TwoWheels):
 
 
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
-    """The driver has the parameter ``metres_per_count``. The tool finds it and ``linear_scale``.
+    """The tool finds ``metres_per_count`` and ``linear_scale`` from two straight drives.
 
-    The user measures only two straight drives and no turns, because this driver has no scales for
-    its odometry.
+    The user measures no turns, because the driver of this board has no scales for its odometry.
     """
     robot = Encoder()
     console = Console(

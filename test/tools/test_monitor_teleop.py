@@ -57,9 +57,9 @@ def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: flo
 
 
 def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
-    """After a single press, the motion ends after 0.6 s.
+    """After the first press of a key, the motion ends after 0.6 s.
 
-    After a repetition, it ends after 0.3 s.
+    If the user presses or holds the same key, the motion ends 0.3 s after the last repetition.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
@@ -71,10 +71,10 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 
 @pytest.mark.parametrize("key_first", [True, False])
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
-    """Keys that are pressed while the program is suspended are discarded. Later keys steer.
+    """Keys that the user presses while the program is suspended are discarded. Later keys steer.
 
-    After the suspension, the first key may come before the first call of ``command``, or after it.
-    Both orders are tested.
+    The first key after the suspension may arrive before or after the next call of ``command``. The
+    test runs with both orders.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)

@@ -65,7 +65,7 @@ def test_what_may_appear_later_is_not_refused(url: str) -> None:
 
 
 def test_a_file_and_a_folder_are_refused(tmp_path: Path) -> None:
-    """The path is that of a folder or a file, or of a link to one. It is refused."""
+    """The path of a folder, of a symbolic link to a folder, or of a file is refused as a port."""
     link = tmp_path / "link"
     link.symlink_to(tmp_path)
     for path in (str(tmp_path), str(link), __file__):
@@ -100,7 +100,8 @@ def test_a_port_with_a_descriptor_is_accepted_for_a_board_with_several(url: str)
 def test_a_check_opens_nothing() -> None:
     """The driver checks the address of a port without opening the port.
 
-    If the check opened the port, the terminal would be exclusive, and a board might restart.
+    Opening the port during the check could do harm: it could restart the board, and it would keep
+    other programs from opening the port.
     """
     ours, theirs = os.openpty()
     try:

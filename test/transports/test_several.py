@@ -23,7 +23,7 @@ from omnibot_driver.transports.several import Several
 
 
 class Ends:
-    """The ends of two lines: ``far`` at the boards, ``near`` at the driver."""
+    """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends."""
 
     def __init__(self) -> None:
         self.far, self.near, self.paths = [], [], []
@@ -161,9 +161,10 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A line's buffer is full. The driver must be able to open this line again.
+    """A line's buffer is full, so the driver will close this line and open it again.
 
-    The line is therefore not shared with the guard, whose lock would prevent the new opening.
+    The driver does not share such a line with the guard. The guard would hold the lock of the port,
+    and then the driver could not open the port.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])

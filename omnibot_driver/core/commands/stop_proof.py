@@ -27,19 +27,20 @@ SLACK_S: Final = 1e-6
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof.
 
-A single displacement could be damaged, or could have been measured before the wheels turned.
+A single displacement is not enough. It could be damaged, or it could come from the time before the
+wheels began to turn.
 """
 PROOFS: Final = 2.0
-"""The driver waits for a proof for at least this factor times ``still_s``.
+"""Shortest time for which the driver waits for a proof, as a multiple of ``still_s``.
 
 ``still_s`` is the duration of standstill that proves a stop.
 """
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-The period is taken from the duration of the newest displacement. If this duration is longer than
-``RAREST_S``, the displacement also contains the motion of earlier displacements, which were lost.
-Such a duration does not show the period.
+The driver takes the period from the duration of the newest displacement. After a loss, a
+displacement also contains the motion of the lost displacements, and its duration is longer than the
+period. So a duration above ``RAREST_S`` is replaced by ``RAREST_S``.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop

@@ -36,7 +36,7 @@ class FejemisBoard(Board):
 
     ``services``: the user's requests that only a Fejemis has, such as brush and lift.
 
-    ``settings``: may be replaced at any time.
+    ``settings``: the settings in use. The caller may replace them at any time.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -307,9 +307,11 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the guard's packets: Stop; with a latched e-stop, emergency stop and then Stop.
+        """Return the packets that the guard sends if the driver fails.
 
-        In both cases, the packets also switch brush and lift off.
+        The first item, for the case without an e-stop, contains Stop. The second item, for a
+        latched e-stop, contains the emergency stop and then Stop. Both also switch brush and lift
+        off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One half, the drive board or the front board: its identity, its data streams, its silence.
+"""One of the two boards (a *half*): its identity, its data streams, and its silence.
 
 If a stream does not arrive, the driver subscribes again.
 
@@ -62,8 +62,9 @@ class Half:
 
     ``heard_at``: time in s of the last valid line.
 
-    ``clocks``: the clocks of the earlier connections, by identity. A half takes the clock of its
-    board from here, because the board may have been at the other port before.
+    ``clocks``: the clocks of both boards from earlier connections, by identity. Both halves share
+    them. The boards may have exchanged their ports, so a half finds the clock of its board by the
+    identity.
     """
 
     def __init__(self, line_sums: LineSums, clocks: dict[int, TeensyClock]) -> None:
@@ -138,7 +139,8 @@ class Half:
     def not_understood(self, now: float) -> bool:
         """Return whether more than ``MANY`` lines were damaged or unknown in the current second.
 
-        The caller calls this after each read.
+        The caller calls this method after each read. A new second begins with the first call after
+        the last second has ended.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults

@@ -17,16 +17,15 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: range of the power of ten of a number's first digit. ``SMALLEST`` is
-in the range, ``LARGEST`` is just above it."""
+"""The first digit's power of ten is at least ``SMALLEST``, and less than ``LARGEST``."""
 
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all numbers that can be sent safely, in rising order, and the text of each number.
 
-    ``negative``: whether the line has a minus sign. Its numbers must then not contain ``6``,
-    because the checksum does not detect the loss of a ``-`` together with a ``6``.
+    ``negative``: whether the numbers are for a line that contains a minus sign. They then contain
+    no ``6``, because the checksum does not detect the loss of a ``-`` together with a ``6``.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.
@@ -46,7 +45,7 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
     """Return the safe number that is nearest to a positive ``number``, with its text.
 
-    A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
+    If any two characters of a safe number (``numerals``) are lost, the checksum detects this.
 
     ``down``: whether the result must not exceed ``number``. If all safe numbers exceed it, the
     smallest of them is returned.
@@ -61,7 +60,7 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
     """Return the safe numbers just below and just above ``number``, with their texts.
 
-    A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
+    If any two characters of a safe number (``numerals``) are lost, the checksum detects this.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -72,7 +71,7 @@ def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
     """Return the safe numbers from ``least`` to ``most``, with their texts.
 
-    A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
+    If any two characters of a safe number (``numerals``) are lost, the checksum detects this.
     """
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))
@@ -80,7 +79,10 @@ def between(least: float, most: float, *, negative: bool) -> list[tuple[float, s
 
 
 def _written(mantissa: str, power: int) -> str:
-    """Return the text of a number with three digits; ``power``: the first digit's power of ten."""
+    """Return the text of a number with the three digits ``mantissa``.
+
+    ``power``: power of ten of the first digit.
+    """
     if power >= SIGNIFICANT - 1:
         return mantissa + "0" * (power - SIGNIFICANT + 1)
     if power >= 0:

@@ -28,13 +28,19 @@ In this period, a line is accepted however late it is, because it may have waite
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: a new clock begins after ``AGAIN`` implausible board
-times in a row. The last must arrive at least ``AGAIN_AFTER_S`` s after the first. Between the first
-and each later one, board time and arrival time must advance equally, within ``AGREE_S`` s."""
+"""Largest disagreement of board times, in s, with which the clock still begins anew.
+
+The clock begins anew after ``AGAIN`` implausible board times in a row. The last of these times must
+arrive at least ``AGAIN_AFTER_S`` s after the first. From the first time to each of the others, the
+board time must advance as much as the arrival time. ``AGREE_S`` is the tolerance.
+"""
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s in which three lines (``AGAIN``) must seem to arrive early, so that the clock
-begins again. Such lines show that the clock began with a late line. They need not come in a row: a
-line between them may be late too, and then seems right."""
+"""Longest time in s between lines that together make the clock begin anew.
+
+A line seems to arrive early if the clock began with a line that was late. After three (``AGAIN``)
+such lines, the clock begins anew. There may be other lines between the three: a line that is late
+itself does not seem early.
+"""
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
 SMALLEST_STEP_S: Final = 1e-6
@@ -59,9 +65,9 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """``_odds``: how many implausible times in a row agree with each other.
+        """Number of implausible times in a row that agree with each other.
 
-        ``_odd``: the first of these times, and when it arrived.
+        ``_odd``: the first of these times, and its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
         """Board times that seem early, but are otherwise plausible, each with its arrival time."""
@@ -71,7 +77,8 @@ class TeensyClock:
     def connect(self) -> None:
         """Begin a new connection, and keep the times of the board.
 
-        The lines of the new connection have not waited for the end of an earlier stall.
+        An earlier stall does not concern the new connection: its lines did not wait for the end of
+        that stall.
         """
         self._stalled, self._waited_until = False, -math.inf
 
@@ -125,7 +132,10 @@ class TeensyClock:
         return True
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
-        """Return whether enough implausible times agree with each other; if so, begin anew."""
+        """Begin anew if enough implausible times in a row agree with each other.
+
+        Return whether the clock has begun anew.
+        """
         if self._odd is None or abs((board_s - self._odd[0]) - (now - self._odd[1])) >= AGREE_S:
             self._odd, self._odds = (board_s, now), 1
             return False
@@ -142,10 +152,13 @@ class TeensyClock:
         return True
 
     def _began_late(self, board_s: float, now: float) -> bool:
-        """Return whether enough early times agree with each other; if so, begin anew.
+        """Begin anew if enough lines seemed to arrive early, and their times agree with each other.
 
-        No line can arrive early. If the clock began with a line that had waited for the host, lines
-        that have not waited seem early. Without a new beginning, they might be rejected for ever.
+        Return whether the clock has begun anew.
+
+        In fact, no line can arrive early. But the clock may have begun with a line that had waited
+        for the host. Then lines that did not wait seem early. Without a new beginning, the driver
+        might reject such lines for ever.
         """
         agree = all(
             before_s < board_s
@@ -168,9 +181,9 @@ class TeensyClock:
 class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
-    The class is a ``ReadingClock``, the interface that gives readings their timestamps. Timestamps
-    of one kind of reading increase by ``SMALLEST_STEP_S`` at least. A timestamp is later than the
-    time of the call only if this step requires it.
+    The class is a ``ReadingClock``, the interface that gives readings their timestamps. Two
+    timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. To keep this step, a
+    timestamp may be later than the time of the call. In all other cases, it is not later.
     """
 
     skew_ppm = 0.0
@@ -181,7 +194,7 @@ class StampedReadings:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the readings of the last call."""
+        """Forget the readings of the board's last call, because a new call begins."""
         self.readings: list[Reading] = []
         self._stamps: list[float] = []
 
@@ -205,7 +218,8 @@ class StampedReadings:
     ) -> list[float]:
         """Return the timestamps of the readings that were added with ``add``.
 
-        If ``readings`` has another number of readings, return ``now`` for each of them.
+        If the length of ``readings`` is not the number of added readings, return ``now`` for each
+        reading.
         """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 

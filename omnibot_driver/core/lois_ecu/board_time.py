@@ -56,9 +56,11 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Change, in s, of a difference since the first tick report. The difference is the arrival
-        time minus the board's time. The first value is for a clock that always runs. The second
-        value is for a clock that stops while the board sends."""
+        """Arrival time minus board time, as its change in s since the first tick report.
+
+        The first value assumes that the board's clock always runs. The second value assumes that
+        this clock stops while the board sends.
+        """
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -74,7 +76,8 @@ class BoardTime:
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         """Return the delay in s, at least 0, of ticks that arrive at ``now``.
 
-        The time ``now`` minus the delay never decreases from call to call.
+        ``now`` minus the delay is the time of the ticks. It never decreases from one call to the
+        next.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s

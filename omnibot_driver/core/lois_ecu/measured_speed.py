@@ -5,7 +5,7 @@
 The firmware measures a wheel's speed at each tick of the wheel, and computes its odometry from the
 last measured speeds. The motion filter calls this module in each step in which a wheel rolls.
 
-This module works on the states of the filter, without reports.
+This module knows the states of the filter. It does not know the board's reports.
 """
 
 import math

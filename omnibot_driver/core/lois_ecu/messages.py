@@ -280,8 +280,8 @@ class BoardOdometry:
 
     Both are in a coordinate frame that is fixed to the floor. Velocities may be NaN or infinite.
 
-    ``appended``: whether the report has the command byte of a tick report (0x12), as in the public
-    firmware, instead of its own (0x20).
+    ``appended``: whether the report began with the command byte of a tick report (0x12). The public
+    firmware sends it so. According to the manual, the byte is 0x20.
     """
 
     x_m: float

@@ -48,21 +48,21 @@ LATE_PART: Final = 0.6
 speed controller's period."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
-"""The firmware rounds a measured speed down. ``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard
-deviation of the difference, in RPM."""
+"""Standard deviation of the amount by which the firmware rounds down a speed, in RPM.
+
+``ROUNDED``: mean of this amount.
+"""
 # While a wheel rolls backward, the firmware lowers the target with each tick until the controller's
 # next step. A feed-forward may make the wheel much faster still.
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""A wheel that rolls backward is faster than its set-point.
+"""Standard deviation that is added to a wheel's excess when its set-point changes.
 
-``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of this excess, as a fraction of the
-set-point.
+The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
+``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess.
 
-``EXCESS_CHANGE``: standard deviation that is added when the set-point changes.
-
-In each pair, the first value is for the board's own controller gains, the second for the user's.
+Each of these constants has two values: for the board's own controller gains, and for the user's.
 """
 DUTY_STDDEV: Final = 0.3
 REVERSES_S: Final = 0.2
@@ -96,11 +96,11 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference, in m/s, that was expected between the two measured wheel speeds.
+        """Smallest expected difference between the two measured wheel speeds, in m/s.
 
-        The smallest is chosen from all differences since the reported distance was last compared
-        with the estimate. While both speeds are equal, the public firmware does not change the
-        position that it reports.
+        It is the minimum since the driver last compared the distance that the board reports with
+        the estimated distance. It matters because the public firmware does not change the reported
+        position while both speeds are equal.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
@@ -126,7 +126,7 @@ class MotionFilter:
         return ROUNDED * self.rpm_mps
 
     def shown_mps(self, wheel: int) -> float:
-        """Return the signed speed in m/s that the firmware is expected to have measured last."""
+        """Return the estimated speed that the firmware has measured last, in m/s, with sign."""
         held = self.filter.mean[PER_WHEEL * wheel + HELD] - self.rounded_mps(wheel)
         return self.wheels[wheel].course.measured_sign * max(held, 0.0)
 
@@ -188,11 +188,12 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
-        """Add an error to a wheel's estimated distance, and to all states that depend on it.
+        """Increase the uncertainty of a wheel's distance, and of all states that depend on it.
 
-        ``stddev_m``: standard deviation of the error.
+        ``stddev_m``: standard deviation to add to the distance.
 
-        ``counted``: whether the board counted the wheel's ticks when the error arose.
+        ``counted``: whether the board was counting the wheel's ticks when the distance became
+        uncertain.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -201,12 +202,15 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt_way(self, index: int, stddev_m: float) -> None:
-        """Add an error to a wheel's distance, but not to its expected count of ticks."""
+        """Increase the uncertainty of a wheel's distance, but not of its tick count."""
         terms = [term for term in self._way_terms(index) if term[0] != PER_WHEEL * index + COUNT]
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt_place(self, stddev_m: float) -> None:
-        """Add an error to the robot's position, but not to its heading or its wheels' distances."""
+        """Increase the uncertainty of the robot's position.
+
+        The uncertainty of its heading and of its wheels' distances stays the same.
+        """
         for state in (X, Y):
             self.filter.disturb([(state, 1.0)], stddev_m**2)
 

@@ -21,13 +21,14 @@ X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 ``X``, ``Y``: position in m.
 
 ``TURN``: how much farther the right wheel has rolled than the left one, in m. ``ALONG``: mean
-distance of both wheels, in m. Both are what the board's odometry (0x20) should show.
+distance of both wheels, in m. These two states are the values that the board's odometry (0x20) is
+expected to show.
 
-``BIAS``: index of the first of two states, one for each wheel. The state is the error of the
-wheel's speed.
+``BIAS``: index of the left wheel's state; the right wheel's state follows it. The state is the
+error of the wheel's speed.
 
-``EXCESS``: index of the first of two states, one for each wheel. A wheel that rolls backward is
-faster than its set-point. The state is this excess, as a fraction of the set-point.
+``EXCESS``: index of the left wheel's state; the right wheel's state follows it. A wheel that rolls
+backward is faster than its set-point. The state is this excess, as a fraction of the set-point.
 """
 STATES: Final = 18
 
@@ -47,16 +48,22 @@ DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""``COASTING_S``: time constant in s with which a wheel without power slows down. ``DRY_MPS2``: its
-additional deceleration by dry friction, in m/s²."""
+"""Deceleration of a wheel without power by dry friction, in m/s².
+
+It comes in addition to an exponential decay of the speed. ``COASTING_S`` is the time constant of
+this decay, in s.
+"""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Time in s for which a wheel's modelled speed is assumed to have been wrong, if the wheel halts
-soon after a new set-point. First value: with the board's own gains. Second value: with the user's
-gains."""
+"""Time in s that gives the error of a wheel's distance, if the wheel halts after a new set-point.
+
+A wheel that halts soon after a new set-point has not yet reached the speed that the filter assumed.
+The standard deviation of the error is this time, multiplied by ``unsettled_mps``. The first value
+is for the board's own gains, the second for the user's.
+"""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -70,12 +77,13 @@ class Step:
 
     ``new``: means of the states after the step.
 
-    ``unsure_mps``: standard deviation of each wheel's last measured speed, by the index of the
-    wheel's first state.
+    ``unsure_mps``: for each wheel, the standard deviation of its last measured speed. The key is
+    the index of the wheel's first state.
 
-    ``rows``: changed rows of the transition matrix, by state.
+    ``rows``: changed rows of the transition matrix. The key is the index of the state.
 
-    ``noises``: errors to add. For each: the states that it changes, with factors, and its variance.
+    ``noises``: errors to add. Each error has a variance, and a list of the states that it changes.
+    Each state comes with its factor.
     """
 
     dt: float
@@ -90,17 +98,20 @@ class Wheel:
 
     ``base``: index of the wheel's first state in the filter.
 
-    ``blind``: whether the wheel moved or had a target while its ticks were not counted. The caller
-    clears the flag.
+    ``blind``: whether the wheel moved, or had a target, in a time in which the board did not count
+    its ticks. The caller sets this flag to False again.
     """
 
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m that the wheel had rolled at the last time at which its motion was certain,
-        or at which a command to turn took effect. If the wheel is later found to have been at rest
-        since that time, the distance that was added since then is subtracted."""
+        """Rolled distance in m at the last time at which the wheel's motion was certain.
+
+        A command to turn also sets this value when it takes effect. The driver may find out later
+        that the wheel has been at rest since then. It then subtracts the distance that it has added
+        since.
+        """
         self.begin_again()
 
     def begin_again(self) -> None:
@@ -114,21 +125,30 @@ class Wheel:
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
-        """Whether the wheel has no power after a reset of the controller, because the integral
-        ``wound_m`` is still too small."""
+        """Whether the controller was reset, and the wheel has no power yet.
+
+        The wheel gets power again when the integral ``wound_m`` is large enough.
+        """
         self.rolls_on = False
-        """Whether the speed that the board reports is not used, because it may still be from before
-        the last reset of the controller."""
+        """Whether the driver ignores the speed that the board reports.
+
+        The board may have measured this speed before the last reset of the controller.
+        """
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """``rolled_mps``: speed in m/s at the last reset of the controller. ``rolled_s``: time in s
-        since this reset."""
+        """Time in s since the last reset of the controller.
+
+        ``rolled_mps``: speed of the wheel at this reset, in m/s.
+        """
         self.locked = False
         """Whether the wheel is at rest and gets no power. The reason is that the last measured
         speed, which the controller still uses, exceeds the target."""
         self.rests = False
-        """Whether the wheel is at rest, as found from a measured speed that the board repeats."""
+        """Whether the driver has concluded that the wheel is at rest.
+
+        It can conclude this, for example, when the board repeats the same measured speed.
+        """
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:

@@ -68,9 +68,10 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the current heading is exactly zero because the server was restarted.
 
-        A restarted server reports zero until its first forward drive (RM). A heading that only
-        passes through zero was near zero before. ``before_rad``: the previous heading, or
-        None.
+        A restarted server reports zero until its first forward drive (RM). Without a restart, the
+        heading can also pass through zero. But then the previous heading was near zero.
+
+        ``before_rad``: the previous heading, or None.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False
@@ -141,7 +142,8 @@ class Measuring(Starts):
             self._switch_off.doubt()
             self._notice(
                 "robot moves, but the server knows of no motion; the driver switches the motors"
-                " off. If the server does not know MCS, the driver commands a turn of 1 degree",
+                " off with MCS. If the server does not support MCS, the driver commands a turn of"
+                " 1 degree, which stops the robot",
                 halt=True,
             )
             return

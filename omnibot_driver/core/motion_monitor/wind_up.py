@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Wind-up: the distance that wheel controllers make up for after the robot was held or pushed.
+"""Wind-up: the extra distance that wheel controllers drive after the robot was held or pushed.
 
-The controllers integrate their errors. So a released robot moves too fast or backwards, even after
-another command or Stop. This module knows velocities; it does not know which are allowed.
+The wheel controllers integrate their errors while the robot is held or pushed. So when it is
+released, it moves too fast or backwards, even after another command or Stop.
+
+This module knows velocities; it does not know which velocities the set-points allow.
 """
 
 import math
@@ -15,7 +17,7 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""Largest distance in m that a robot is assumed to make up for.
+"""Largest assumed wind-up, in m.
 
 At this distance, the integrators of the wheel controllers reach their limits.
 """
@@ -46,10 +48,9 @@ speed of a wheel."""
 
 
 class WindUp:
-    """The wind-up of one robot.
+    """The wind-up of one robot: the extra distance that its wheel controllers may still drive.
 
-    ``way_m``: size of the wind-up. This is the distance in m, at the rim of a wheel, that the
-    wheel controllers may still make up for.
+    ``way_m``: this distance in m, at the rim of a wheel.
     """
 
     def __init__(self) -> None:
@@ -65,7 +66,8 @@ class WindUp:
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
         """Subtract from the wind-up a motion that the set-points do not allow.
 
-        Return whether the wind-up explains this motion: whether it was larger than the motion.
+        Return whether the wind-up explains this motion. It does if the wind-up, before the
+        subtraction, is larger than the distance of the motion.
 
         ``way_mps``, ``turn_radps``: excess of the motion over the allowed velocities. The motion
         lasted ``seconds``.
@@ -77,7 +79,10 @@ class WindUp:
         return explained
 
     def carry(self, motion: BodyTwist, seconds: float) -> None:
-        """Add the motion of a robot that is moved by hand while its set-point is rest."""
+        """Add to the wind-up the motion of a robot that is moved by hand.
+
+        Its set-point is rest.
+        """
         moved_mps = speed_of(motion) + LEVER_M * abs(motion.yaw_rate_radps)
         self.way_m = min(MOST_M, self.way_m + moved_mps * seconds)
 
@@ -89,11 +94,12 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance by which a held robot falls behind.
+        """Add to the wind-up the distance by which a held robot falls behind its set-point.
 
         If the robot is not held, the wind-up decays.
 
-        ``motion``: mean twist during ``seconds``. It must be a twist that the set-points allow.
+        ``motion``: mean twist during ``seconds``. The caller has checked that the set-points allow
+        it.
 
         ``newest``: set-points that the robot may still be approaching, the current one first.
 

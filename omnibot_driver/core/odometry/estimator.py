@@ -3,8 +3,9 @@
 """The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
 The robot's pose is stored twice: in the board's frame (``_board``), and in the odometry frame (in
-the CorrectionSmoother). Both poses move by the same tangents (twist x time), so the board's next
-pose shows lost motion. This module knows SE(2); it does not know bytes, clocks or ROS.
+the CorrectionSmoother). Each displacement moves both poses by the same tangent (twist x time). If
+displacements are lost, the board's next pose differs from ``_board``. The difference is the lost
+motion. This module knows SE(2); it does not know bytes, clocks or ROS.
 """
 
 import math
@@ -34,8 +35,11 @@ POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Standard deviation, in rad, from which on the board's heading counts as unknown. Only the error
-by lost displacements is included, and only until a pose of the board shows the lost motion."""
+"""Largest standard deviation, in rad, with which the board's heading counts as known.
+
+This uncertainty comes only from lost displacements. It lasts until a pose of the board shows the
+lost motion.
+"""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -65,7 +69,8 @@ class OdometryEstimate:
 
     * ``twist``: None if the duration of the displacement is unknown.
     * ``rolled``: sum of the tangents (twist x time) of all motion so far, in the board's axes.
-    * ``rolling``: twist in the board's axes, by which ``rolled`` changes; None if unknown.
+    * ``rolling``: present rate of change of ``rolled``, a twist in the board's axes; None if
+      unknown.
     * ``twist_variances``: linear in m²/s², angular in rad²/s². If None, the values of the
       parameters are published.
     """
@@ -196,9 +201,11 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Convert ``place`` from the odometry frame into the board's frame.
 
-        The board's heading includes full turns. The result has the heading that the robot reaches
-        by the shorter turn. Return None while no pose of the board shows how the frames are
-        related, and if ``use_board_pose`` is False.
+        The board's heading is not limited to one turn. So the result has the heading that the robot
+        reaches from its current heading by the shorter turn.
+
+        Return None if ``use_board_pose`` is False. Also return None while the relation of the two
+        frames is unknown, because no pose of the board has shown it.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -213,20 +220,28 @@ class Odometry:
 
     @property
     def _settles(self) -> bool:
-        """Whether the board's poses can reveal lost motion: they are used, and one was accepted."""
+        """Whether the board's poses can reveal lost motion.
+
+        They can if the settings use them (``use_board_pose``), and if one pose has been accepted.
+        """
         return self._settings.use_board_pose and self._belief.proved is not None
 
     # The board's frame
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
-        """Return whether a pose is the first one, or shows a new frame after a suspected restart.
+        """Return whether the odometry must adopt the board's frame in which this pose is given.
 
-        * The first pose must confirm the last doubted pose (``confirmed``).
-        * After a suspected restart, a pose shows a new frame at once if it fits the motion since
-          the restart, and fits it better than the old frame. Any other pose must confirm the last
-          doubted pose.
-        * A pose that fits the old frame ends the suspicion, so the result is False. A pose in the
-          old frame also does so if it is confirmed and the robot can have reached it.
+        This happens with the first pose, and with a pose in a new frame after a suspected restart.
+        A pose is *confirmed* (``confirmed``) if it agrees with the last doubted pose.
+
+        * Before a first pose was accepted: the result is True if the pose is confirmed.
+        * Without a suspected restart: the result is False.
+        * After a suspected restart, the pose fits the motion since the restart, and fits it better
+          than the old frame: the frame is new, and the result is True.
+        * After a suspected restart, the pose fits the old frame: the suspicion ends, and the result
+          is False. The same holds for a confirmed pose that the robot can have reached in the old
+          frame.
+        * After a suspected restart, any other pose: the result is True if the pose is confirmed.
         """
         if self._board is None:
             return confirmed
@@ -250,9 +265,12 @@ class Odometry:
         return estimates
 
     def _resume(self, told: Pose, lost_s: float) -> list[OdometryEstimate]:
-        """Use a pose to compute the motion that was lost before the waiting displacements.
+        """Use a pose of the board to compute the motion of lost displacements.
 
-        ``lost_s``: duration of the gap in s if no displacement is waiting.
+        Displacements that arrived after the loss, but before the pose, are waiting. They are
+        published now.
+
+        ``lost_s``: duration of the gap in s. It is used only if no displacement is waiting.
         """
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s) if self._backlog else lost_s
@@ -283,7 +301,8 @@ class Odometry:
         """Accept a pose of the board, or keep it as ``doubted`` until the next pose.
 
         A pose is accepted if it is reachable and expected, or if it confirms the last doubted pose.
-        If the accepted pose is unreachable, the board's frame has moved, not the robot.
+        A confirmed pose may be unreachable for the robot. Then the board's frame has moved, not the
+        robot.
         """
         assert self._board is not None
         way = self._board.way_to(told)
@@ -336,7 +355,7 @@ class Odometry:
         return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
-        """Add assumed motion for a gap.
+        """Add an assumed motion (``tangent``) for a gap in the displacements.
 
         ``seconds``: duration of the gap, computed from the number of lost displacements.
 
@@ -348,9 +367,10 @@ class Odometry:
         self._move(tangent, seconds, min(seconds, max(0.0, stamped_s)))
 
     def _bridge_until_pose(self, lost: int) -> None:
-        """Assume that the last motion continued during the ``lost`` displacements before a pose.
+        """Assume a motion for displacements that were lost just before a pose of the board.
 
-        The assumed motion lasts at most ``LONGEST_BRIDGE_S``.
+        ``lost``: number of the lost displacements. The robot is assumed to have continued its last
+        motion, but at most for ``LONGEST_BRIDGE_S``.
         """
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
@@ -359,7 +379,9 @@ class Odometry:
             self._cross(tangent.times(most, most, most), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Add a motion that took ``seconds``: a tangent (twist x time) in the board's body axes.
+        """Add a motion (``tangent``, twist x time) in the board's body axes.
+
+        ``seconds``: duration of the motion, in s.
 
         ``stamped_s``: time between the stamps before and after the motion, in s.
         """

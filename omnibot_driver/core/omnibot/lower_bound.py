@@ -4,8 +4,8 @@
 
 The headers show the least number of damaged frames.
 
-Input: bytes; output: for each place, the least possible cost of the bytes after it. This module
-does not know the search (``trellis``), which uses the bound.
+Input: bytes. Output: for each position in the bytes, the least possible cost of all bytes after it.
+This module does not know the search (``trellis``), which uses the bound.
 """
 
 import re
@@ -16,14 +16,17 @@ from omnibot_driver.core.omnibot.frames import INCOMPLETE, NO_FRAME, measure
 
 DAMAGE: Final = ONE_BYTE
 REACH: Final = 15 + 2
-"""Largest number of bytes that one damaged frame covers: 15 of the longest frame, and 2 that the
-line has added."""
+"""Largest number of bytes that one damaged frame covers.
+
+The longest frame has 15 bytes, and damage on the line can add 2.
+"""
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the last 15, 14, ... 1 bytes of a run of unexplained bytes (a bad run).
+"""Costs of the rest of a run of unexplained bytes (a bad run), from long to short.
 
-The largest of these costs is a little below ``DAMAGE``, the cost of a damaged frame.
+The first value is for a rest of 15 bytes, the last for one byte. The first value is a little below
+``DAMAGE``, the cost of a damaged frame.
 """
 
 
@@ -60,7 +63,9 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return, for each possible start of a frame, the end of the row of undamaged frames from it.
+    """Return, for each position where a frame may start, the end of undamaged frames in a row.
+
+    The row consists of the frame at this position and the frames that follow it without a gap.
 
     Keys and values are positions in ``data``. The keys are in descending order.
     """

@@ -26,16 +26,17 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """The zeros that are sent before Stop, the emergency stop or a letter.
 
-If the previous frame lost its end, seven zeros complete it. An eighth zero is sent, because one may
-be lost. Three zeros wake a board.
+They have two purposes. If the previous frame lost its end, seven zeros complete it. An eighth zero
+is sent, because one may be lost. The zeros also wake a board; three are enough for this.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-If the previous frame lost its end, the zeros may complete it as a wrong command. Only a few zeros
-are sent, so that the motion frame soon replaces the wrong command.
+The previous frame may have lost its end. Then the zeros take the place of the lost bytes, and the
+board obeys a wrong command. Only a few zeros are sent, so that the motion frame soon replaces the
+wrong command.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

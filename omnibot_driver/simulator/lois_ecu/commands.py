@@ -21,7 +21,9 @@ BALL_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A valid line that the board has processed. Its command may be unknown.
+    """A line that the board has processed.
+
+    The line has a valid form, but the board may not know its command.
 
     ``tick``: number of the tick in which the line was processed.
     """

@@ -105,7 +105,7 @@ class Encoder:
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._level_from = self._level_to = 0.0
-        """Positions of both ends of the level that is at the sensor now, in periods."""
+        """Positions of the two ends of the level at the sensor, in periods of the disc."""
         self._per_turn = steps / 2
         self._short = short
         # The distance between two marks has the position errors of both marks. So the error of each
@@ -142,7 +142,7 @@ class Encoder:
         ]
 
     def _place(self, edge: int) -> float:
-        """Return the position of an edge, in periods."""
+        """Return the position of an edge, in periods of the disc."""
         return edge // 2 + (self._short if edge % 2 else 0.0) + self._off[edge % len(self._off)]
 
     def _level(self, periods: float) -> int:
@@ -157,7 +157,8 @@ class Gains:
     """Gains of the manual's speed controller.
 
     feed_forward: in percent of duty per RPM.
-    low_pass: 0..1, the part of the difference to the new target that each step applies.
+    low_pass: 0..1. In each step, the controller's target changes by this part of its difference to
+        the commanded target.
     """
 
     kp: float

@@ -2,7 +2,8 @@
 
 """Records of tick times, torques and headings. A record is sampled, then encoded as lines.
 
-This module knows wheels as the board sees them. It does not know when the lines are sent.
+This module knows the values that the board measures on its wheels. It does not know when the lines
+are sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire

@@ -166,9 +166,9 @@ class MartServer(ServerState):
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` when ``post`` announces that a motion of ``kind`` has started or ended.
+        """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
 
-        If ``post`` has kept an earlier notice of this kind, call ``then`` now.
+        If such a report is already waiting, call ``then`` now.
         """
         motion = self.motions[kind]
         if motion.posts:
@@ -179,9 +179,9 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Tell the first port that waits for it that a motion of ``kind`` has started or ended.
+        """Report the start or the end of a motion of ``kind`` to the first port that waits for it.
 
-        If no port waits for a motion of this kind, keep the notice for the next ``wait``.
+        If no port waits for such a report, keep the report for the next ``wait``.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -35,9 +35,8 @@ def obey(server: "MartServer", text: str) -> None:
 def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop an uncontrolled motion (F, B, RM, R, L).
 
-    Return whether the caller must wait for the notice that the motion has ended. A motion that is
-    already stopping does not change. A drive (F, B, RM) that the server does not supervise does not
-    change either.
+    Return whether the caller must wait for the end of the motion. A motion that is already stopping
+    is left as it is. The same holds for a drive (F, B, RM) that the server does not supervise.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

@@ -102,7 +102,8 @@ class WheelController:
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    While the PWM is at its limit, the integral only changes away from the limit.
+    While the PWM is at its limit, the integral term changes only if this moves the PWM away from
+    the limit.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

@@ -188,9 +188,10 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first error is with the driver's current geometry. The second error is with the geometry
-    ``found``, but with its mean radius for all three wheels, because the driver has no parameters
-    for single wheels.
+    The first error is with the driver's current geometry.
+
+    The second error is with the geometry ``found``. It uses the mean radius for all three wheels,
+    because the driver has no parameters for single wheels.
     """
     before: list[float] = []
     after: list[float] = []

@@ -2,8 +2,8 @@
 
 """Fit the robot's geometry to drives whose ends the user measured with a tape.
 
-Method: J. Borenstein and L. Feng, "UMBmark" (1995), extended to three wheels. This module knows
-paths and readings; it does not know how the robot was driven.
+Method: J. Borenstein and L. Feng, "UMBmark" (1995), extended to three wheels. This module knows the
+paths by odometry and the user's measurements; it does not know how the robot was driven.
 """
 
 import math
@@ -118,13 +118,14 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the poses that a path has if the radii differ from the assumed ones, (n, 3).
+    """Return the path that the same wheel angles give with other radii, as poses, (n, 3).
 
-    The wheels turn by the same angles as on ``path``. The result begins at the origin.
+    The result begins at the origin.
 
     ``path``: poses that were computed with the assumed radii.
 
-    ``factors``: new radius / assumed radius of each wheel, (3,), or for each step, (n - 1, 3).
+    ``factors``: new radius / assumed radius of each wheel. Either one row for all steps, (3,), or
+    one row for each step, (n - 1, 3).
 
     ``base``: new base radius / assumed base radius.
     """

@@ -3,9 +3,9 @@
 """A least-squares fit of a plant to the times between encoder ticks of several starts.
 
 The plant is the motor with its wheel. A *mark* is a place on the encoder's disc at which the board
-counts a tick, unless it misses the mark. A *record* has the times between the ticks of one start.
-This module knows the motion of a plant, the marks and the noise; it does not know files, and does
-not choose the plant's order.
+counts a tick. Sometimes the board misses a mark. A *record* has the times between the ticks of one
+start. This module knows the motion of a plant, the marks and the noise; it does not know files, and
+does not choose the plant's order.
 """
 
 import math
@@ -25,7 +25,10 @@ Column = NDArray[np.float64]
 SIGMA: Final = 0.1
 """Assumed relative noise of a time between ticks, until the encoder's marks are fitted."""
 SHARPEST: Final = 0.002
-"""Least relative noise of a time between ticks. The board reports times in steps of 0.1 ms."""
+"""Least assumed relative noise of a time between ticks.
+
+There is always some noise, because the board reports times in steps of 0.1 ms.
+"""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
 """Longest allowed sum of both time constants, in s."""
@@ -44,19 +47,22 @@ MOST_OFF: Final = 0.4
 LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered.
 
-Even residuals so far apart are correlated, because the load changes slowly.
+The load changes slowly. Therefore residuals are correlated even at this distance.
 """
 MISSED: Final = 0.42
-"""If the relative errors of two successive times sum to more than this, the board missed a mark.
+"""Limit for the sum of the relative errors of two successive times between ticks.
 
-If the board misses a mark, the first time is twice as long as expected. Its error is 1, and so is
-the sum. The board's clock can lose up to 6 ms, which makes the sum smaller. If the board only
-notices a mark late, the first time is too long and the second too short, so the sum is near 0.
+If the sum is larger, the board missed a mark. The first time is then twice as long as expected. Its
+relative error is 1, and so the sum is about 1. The board's clock can lose up to 6 ms, which makes
+the sum smaller.
+
+The board may also notice a mark late. Then the first time is too long and the second too short, so
+the sum is near 0.
 """
 SURE_TICKS: Final = 4
-"""The tool does not search for missed marks among this number of ticks at the start of a record.
+"""Number of ticks at the start of a record among which no missed mark is searched for.
 
-There, the wheel is still so slow that the board notices every mark.
+At the start, the wheel is still so slow that the board notices every mark of the encoder.
 """
 OUTLIER: Final = 5.0
 """Error of a time between ticks, in standard deviations, above which the time is not used."""
@@ -134,7 +140,10 @@ class Search:
         return self._best(starts)
 
     def closely(self, values: Column) -> Column:
-        """Search again from several ratios of the time constants, to avoid a local optimum."""
+        """Repeat the search with several starting values for the ratio of the time constants.
+
+        This avoids a local optimum.
+        """
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
@@ -148,8 +157,8 @@ class Search:
     def off(self, values: Column) -> list[Column]:
         """Return, for each record, the relative errors of its times, assuming evenly spaced marks.
 
-        A record has one error for each distance between marks. The two errors beside a missed mark
-        are NaN.
+        A record has one error for each distance between neighbouring marks. If the board missed a
+        mark, the errors of the distances before and after this mark are NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -180,7 +189,7 @@ class Search:
         return np.split(off, np.cumsum(self._lengths)[:-1])
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
-        """Fit the plant together with the marks' positions; return the values without positions.
+        """Fit the plant together with the marks' positions; return only the plant's values.
 
         All later searches use the fitted positions.
 
@@ -195,10 +204,12 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Measure the correlation of the residuals at these values; later searches remove it.
+        """Measure the correlation of the residuals, and remove it in all later searches.
 
-        As long as the marks are not fitted, their uneven distances cause the correlation. After
-        the fit, only the changing load causes it.
+        ``values``: the values of the plant for which the residuals are computed.
+
+        As long as the marks are not fitted, their uneven distances cause the correlation. After the
+        fit, only the changing load causes it.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -209,7 +220,10 @@ class Search:
         self._whitener = whitener(correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
-        """Return the relative residuals at these values, without their correlation and outliers."""
+        """Return the relative residuals for ``values``, without outliers.
+
+        The correlation of the residuals, if it was measured (``correlate``), is removed.
+        """
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
@@ -217,8 +231,9 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the plant's own values, which are the same in all records.
 
-        The load changes slowly, so it can differ from record to record. If the records scatter
-        more than the residuals predict, the covariance is increased to this scatter.
+        The load changes slowly, so it can differ from record to record. The records may then
+        scatter more than the residuals predict. In this case, the covariance is raised until it
+        covers the scatter.
         """
         own = 1 + self.order
         found = self._search(values)
@@ -297,7 +312,8 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the predicted times between ticks in s, record after record.
 
-        ``off``: displacements of the marks, if ``values`` does not contain them.
+        ``off``: displacements of the marks. If None, they come from ``values`` or from an earlier
+        fit.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

@@ -88,9 +88,9 @@ def answer(
 
 
 def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
-    """Return Ms: 1 / the smallest distance of the loop's Nyquist curve from -1.
+    """Return Ms, the largest amplification of a disturbance by a stable loop; 1 is best.
 
-    Ms is a stable loop's largest amplification of a disturbance; 1 is best.
+    Ms is the reciprocal of the smallest distance between the loop's Nyquist curve and -1.
     """
     frequency = np.geomspace(1e-3, np.pi, points)
     z = np.exp(1j * frequency)

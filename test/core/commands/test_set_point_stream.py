@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the stream of set-points: its pace, repetition and timeout. The frames are arbitrary."""
+"""Tests of the stream of set-points: pace, repetition, timeout. Any bytes serve as frames."""
 
 import math
 from typing import Any
@@ -104,7 +104,8 @@ def test_stop_never_waits(stream: Stream) -> None:
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
     """The driver has just repeated the last command when a new command arrives.
 
-    It sends the new command at once. Only after another new command, it may have to wait.
+    It sends the new command at once. After a repetition, a new command need not wait; after another
+    new command, it may have to.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -153,9 +154,9 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """A motion, such as a ramp, has a different frame each time.
+    """A motion can have a new frame each time, for example during a ramp.
 
-    The driver sends each frame 18 ms after the previous one.
+    The driver sends these frames at the pace of new commands: one every 18 ms.
     """
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
@@ -196,7 +197,8 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 ) -> None:
     """The command of one topic expires, so the driver sends Stop.
 
-    Later, another topic commands the robot. The driver sends no other Stop before this command.
+    Later, another topic commands the robot. The driver sends the new command at once. It does not
+    send Stop a second time.
     """
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
@@ -220,9 +222,9 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A command ends, so the driver must send Stop. But both are discarded before that.
+    """A command ends, so Stop waits to be sent. Then the driver discards the command and Stop.
 
-    The driver writes nothing.
+    It writes nothing.
     """
     order(stream, GO, 1.0)
     stream.halt(1.0)

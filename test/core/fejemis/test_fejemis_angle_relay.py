@@ -48,8 +48,8 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
     """Two characters of an angle's text are lost. Usually the checksum detects this.
 
-    Only an angle to the right with a digit 6 can change undetected. The board then reads an angle
-    of 0° to 10° to the left.
+    The checksum can miss it only if the angle is to the right and its text contains a 6. In these
+    cases, the board reads an angle of 0° to 10° to the left. No other wrong angle is possible.
     """
     across = 0
     for angle_deg in EVERY:
@@ -92,7 +92,7 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
     """Three characters are lost from a line with an angle.
 
-    In less than 1 % of these cases, the board reads another angle.
+    In less than 1 % of these cases, the board reads a wrong angle.
     """
     chance = random.Random(seed)
     passed = total = 0
@@ -107,9 +107,10 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Lines have no checksum, and up to three characters of an angle are lost.
+    """A board reads no angle beyond 90° from a damaged line without a checksum.
 
-    The board never reads an angle beyond 90°, where the inner wheel would be the faster one.
+    Up to three characters of an angle are lost. Beyond 90°, the inner wheel would be faster than
+    the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
@@ -126,11 +127,12 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """The board reads no angle beyond 90°.
+    """The board reads no angle beyond 90°, although the driver adds rounding errors.
 
-    The driver adds the rounding error of each angle to the next angle. The limit also holds for
-    damaged lines: a line with a checksum loses two characters, and the checksum does not detect it;
-    or a line without a checksum loses one character.
+    The driver adds the rounding error of each angle to the next angle.
+
+    The limit also holds for damaged lines. A line with a checksum may lose two characters, so that
+    the checksum does not change. A line without a checksum may lose one character.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

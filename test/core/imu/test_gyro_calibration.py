@@ -138,7 +138,10 @@ def test_a_robot_that_moves_is_refused_with_what_showed_it(
 
 
 def test_a_shaken_accelerometer_is_motion() -> None:
-    """The robot is carried, and only the accelerometer shows it. The calibration fails."""
+    """The robot is carried. The gyro does not show this, but the accelerometer does.
+
+    The calibration fails.
+    """
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     for number, rate in enumerate(itertools.islice(noisy(NONE, NOISE_RADPS), 210)):

@@ -18,7 +18,10 @@ USUAL, SLOW = MotorSettings(), MotorSettings(time_constant_s=0.2)
 
 
 def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
-    """Drive a program on the public firmware. The driver commands its wheels by duties."""
+    """Return the result of a drive by duty on the public firmware.
+
+    ``program``: the steps of the drive, each with a duration and a set-point for each wheel.
+    """
     settings = replace(nominal("firmware", seed), motors=(motor, motor))
     return Rig(settings, LoisEcuSettings(drive_mode="duty")).drive(program)
 

@@ -161,10 +161,11 @@ def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
 
 @RESOLUTIONS
 def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
-    """A read is late by 2 s. Its last report has a clock in ns and counts near zero.
+    """A read is late by 2 s. The clock (in ns) and the counts of its last report are near zero.
 
-    The board may have restarted before this report, so its clock does not show when the reports
-    came. Therefore the driver uses the arrival time of the read for all of them.
+    So the board may have restarted before it sent this report, and the clock values do not show
+    when the reports were sent. The driver uses the time of the read as the arrival time of all
+    reports.
     """
     late_reads = LateReads(per_turn)
     for number in range(6):

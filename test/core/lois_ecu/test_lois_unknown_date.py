@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The GPS has no date. The position is then not a fix, and the driver requests the date."""
+"""Tests with a GPS that reports positions, but no date.
+
+Such a position is not a fix, and the driver requests the date.
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -134,7 +137,10 @@ def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
 
 @WORKS
 def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirks) -> None:
-    """After midnight the driver requests the new date at once. Positions are still fixes."""
+    """At midnight the date changes, and the driver requests the new date at once.
+
+    Positions are still fixes.
+    """
     rig = GpsRig(quirks, utc_s=UTC_S + DAY_S - 10, dated=True)
     rig.run(5.0)
     rig.fixes()

@@ -35,7 +35,7 @@ EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
 
 
 def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
-    """Return a bench that is ready, and whose network has these faults from now on."""
+    """Return a bench that is ready to drive. Its network has the faults ``network``."""
     bench = MartBench(firmware, seed=seed).ready()
     for channel in bench.robot.network:
         channel.to_board._faults = channel.from_board._faults = network

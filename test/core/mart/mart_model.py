@@ -41,12 +41,12 @@ class Driver(NamedTuple):
 
     ``moved``: whether the last motion was a controlled move (``MOVES``).
 
-    ``counted``: whether the encoder was read after the last stop, when no late command could do
-    harm any more.
+    ``counted``: whether the driver has read the encoder since the last stop. The reading
+    must come when no late command can do harm any more.
 
     ``greeted``: whether a stop of the driver was confirmed at least once.
 
-    ``underway``: whether, as far as the driver knows, the motors may be under direct control (MCS).
+    ``underway``: whether the driver believes that the motors may be under direct control (MCS).
     """
 
     state: State = State.UNKNOWN
@@ -123,7 +123,7 @@ def table(state: State, word: str, motion: Motion) -> bool:
 
 
 def steps(world: World, allowed: Allowed) -> Iterator[Step]:
-    """Yield every step that can follow this world: its name, and the world after it."""
+    """Yield every step that can follow ``world``: its name, and the world after the step."""
     server, driver = world.server, world.driver
     if server.imu:
         yield "the IMU dies", world._replace(server=server._replace(imu=False))
@@ -169,9 +169,9 @@ def _ends(world: World) -> Iterator[Step]:
 
 
 def _waits(world: World) -> Iterator[Step]:
-    """Yield the steps in which the driver sends no command.
+    """Yield the steps in which the driver changes its state without sending a command.
 
-    For example, the user requests a stop, a wait ends, or a query is answered.
+    For example, the driver begins to stop, a wait ends, or a query is answered.
     """
     server, driver = world.server, world.driver
     state = driver.state
@@ -206,7 +206,8 @@ def _waits(world: World) -> Iterator[Step]:
 def sweeps_first(driver: Driver) -> bool:
     """Return whether the driver must find out which motion is in progress before it does more.
 
-    This is so if it has used the stop port, and none of its stops was ever confirmed.
+    This is so if three conditions hold: the driver does not know the motion, it has used the stop
+    port, and none of its stops was ever confirmed.
     """
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
@@ -215,8 +216,8 @@ def sweeps_first(driver: Driver) -> bool:
 def _asked(world: World) -> Step:
     """Return the step in which the driver finds out which motion is in progress.
 
-    The driver does this after a stop on the stop port. There is no step for a lost reply, because a
-    lost reply changes nothing.
+    The driver does this after a stop on the stop port. The model has no step in which the reply is
+    lost: after such a step, the world would be the same as before.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -285,9 +286,11 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply is late, so that it may belong to an earlier command. The driver
-    does not accept a late reply to a check, a controlled move or MSM. A check and a move last
-    longer than the longest delay of a reply, so a late reply arrives too early to be theirs.
+    ``late``: whether the reply is late, so that it may belong to an earlier command.
+
+    The driver does not take a late reply for the answer to a check, a controlled move or MSM. A
+    check and a move take longer than any reply can be delayed. So a late reply to an earlier
+    command arrives before their own reply can come.
     """
     driver = world.driver
     state = driver.state

@@ -25,12 +25,14 @@ KIND: Final = {
 class Server(NamedTuple):
     """The state of the modelled server.
 
-    ``port``: the command port: "free", "busy" with a controlled move, "waits" for a dead IMU, or
-    "hung".
+    ``port``: state of the command port. "free": it accepts commands. "busy": a controlled move is
+    in progress. "waits": it waits for an IMU that does not work. "hung": it does not answer any
+    more.
 
-    ``released``: the stop port has stopped a motion that the server regards as still in progress.
+    ``released``: whether the stop port has stopped a motion that the server still regards as in
+    progress.
 
-    ``manual``: the motors are under direct control (MCS), so motions are refused.
+    ``manual``: whether the motors are under direct control (MCS). The server then refuses motions.
     """
 
     motion: Motion = Motion.NONE
@@ -111,7 +113,8 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 def servers() -> dict[Server, tuple[str, ...]]:
     """Return all states that the server can reach if no datagram is lost.
 
-    Each state has the steps that lead to it. The IMU does not die during a controlled move.
+    The value of each state is a list of the steps that lead to it. The steps include a failure of
+    the IMU, but not during a controlled move.
     """
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}

@@ -134,10 +134,11 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
-    """A turn on the spot shows only the mean speed of the two motors.
+    """The driver does not learn the balance of the motors from a turn on the spot.
 
-    So the driver does not learn the ratio of their speeds from it. This ratio is right at the
-    start (``motor_balance``), and a later drive straight backward is still straight.
+    Such a turn shows only the mean speed of the two motors. Here, the user has set the right
+    balance (``motor_balance``). After turns on the spot, a drive straight backward is still
+    straight.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(
@@ -154,9 +155,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Motor units are whole numbers, so slow turns on the spot are up to 17 % too fast.
+    """Turns on the spot do not change the balance of the motors that a drive has shown.
 
-    They do not change the motor balance that the driver has learned from a drive.
+    Motor units are whole numbers, so slow turns are up to 17 % faster than commanded.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
@@ -227,10 +228,10 @@ def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
-    """The first drive is a curve backward, in which the server reports no heading.
+    """The first drive is a curve backward. The user has set the balance of the motors.
 
-    So the driver cannot measure the balance of the motors. It uses the user's setting, and the turn
-    rate is as commanded.
+    In this curve the server reports no heading, so the driver cannot measure the balance. It uses
+    the user's value, and the turn rate is as commanded.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench("source", settings=settings, motor_inequality=unequal).ready()

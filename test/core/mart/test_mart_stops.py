@@ -132,9 +132,9 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
 def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a move, the answer to HELLO arrives before the move's late reply.
+    """Two replies come in the wrong order: first the answer to HELLO, then the reply of a move.
 
-    The late reply ends the move as usual.
+    The answer to HELLO does not end the move. Its own reply ends it as usual.
     """
     bench = MartBench().ready()
     receive = bench.session.inbound.receive
@@ -161,9 +161,10 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The stop of a turn is lost. Its reply would have been an angle.
+    """The driver stops a turn, but the stop is lost. The reply to it would have been an angle.
 
-    The driver rejects a late encoder count that looks like that angle.
+    Instead, the late reply to an earlier query of the encoder arrives. Its number could be that
+    angle. The driver does not take it for the reply to the stop.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
@@ -261,9 +262,10 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """A command on the stop port directly after a usual stop (SM or SRM) could hang the server.
+    """The driver sends a command to the stop port only some time after a usual stop (SM or SRM).
 
-    So the driver waits for more than the network delay.
+    If the command came directly after the stop, the server could hang. The time is longer than the
+    network delay.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of a controlled turn comes from the server's record, if it keeps such records."""
+"""The driver takes the angle of a controlled turn from the server's record of the turn.
+
+Some servers keep no such records.
+"""
 
 import math
 from typing import Any
@@ -92,12 +95,15 @@ def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
 
 
 def test_the_file_of_another_angle_is_not_used() -> None:
-    """The driver uses a record only if its target is the angle that the driver has requested."""
+    """The server's record of a turn contains the angle of the request.
+
+    The driver uses the record only if it has requested the same angle.
+    """
     assert recorded_deg([RECORD], MCL.request("SLOW", 89)) is None
 
 
 def test_only_the_first_piece_of_the_file_is_needed() -> None:
-    """The angle is in the first piece of the file. The loss of any other piece does no harm."""
+    """The angle is in the first piece of a record. The loss of any other piece does no harm."""
     content = RECORD + b"10,,0.1,2\n" * 100
     first, *others = [content[at : at + PIECE] for at in range(0, len(content), PIECE)]
     assert recorded_deg([first, *others[1:]], MCR.request(90)) == -91.73
@@ -138,8 +144,8 @@ def test_a_server_without_records_is_asked_three_times(
 ) -> None:
     """The server has no records of its turns, or its records contain no usable angle.
 
-    This is possible, because the manual does not specify the records. After three requests for a
-    record, the driver requests no more. The robot still reaches its goals.
+    The manual does not describe the records, so a server may be like this. The driver requests a
+    record three times, and then no more. The robot still reaches its goals.
     """
     bench = MartBench("source").ready()
     if missing == "angle":
@@ -154,9 +160,10 @@ def test_a_server_without_records_is_asked_three_times(
 
 @pytest.mark.slow
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
-    """One motor turns 10 % faster. A few records show the ratio.
+    """One motor turns 10 % faster. A few records of turns show the ratio of the motors.
 
-    The driver then requests no more records, because the public server never closes a sent file.
+    The driver then requests no more records. It avoids needless requests, because the public server
+    never closes a file that it has sent.
     """
     bench = MartBench("source", motor_inequality=0.1).ready()
     for _ in range(2):
@@ -191,7 +198,7 @@ def test_the_record_of_an_earlier_turn_is_not_used() -> None:
 
 @pytest.mark.parametrize("lost", [b"LAST TURN", b"ok MCSpin"])
 def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes) -> None:
-    """The request for a record or its reply is lost.
+    """The driver requests the server's record of a turn. The request or its reply is lost.
 
     The next command still starts a motion at once.
     """
@@ -255,9 +262,10 @@ def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
 
 
 def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> None:
-    """The odometry is reset, and then the record of an earlier turn arrives.
+    """The odometry is reset after a turn. Then the record of this turn arrives.
 
-    The driver discards the record, because the new frame begins at the present heading.
+    The driver discards the record. The turn was before the reset, so its angle does not change the
+    heading in the new frame.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
@@ -269,9 +277,10 @@ def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> Non
 
 
 def test_a_record_makes_the_heading_more_certain_but_not_better_than_the_gyro() -> None:
-    """A record reduces the heading's variance to that of a gyro angle.
+    """The record of a turn reduces the heading's variance to that of a gyro angle.
 
-    An impossible angle or a second record has no effect.
+    A record with an impossible angle has no effect. A second record of the same turn has none,
+    either.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)

@@ -52,9 +52,10 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """A motion limit is too low, so displacements are rejected. The motion monitor is switched on.
+    """The driver rejects displacements, because a motion limit is too low. The monitor is off.
 
-    When four more displacements have been rejected, the monitor stops the robot.
+    The user switches the motion monitor on. After four more rejected displacements, the monitor
+    stops the robot.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)
@@ -79,9 +80,10 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """The motion monitor stops the robot. Further commands are refused until a zero command comes.
+    """After a stop by the motion monitor, a sender that does not pause cannot move the robot.
 
-    After the second stop by the monitor, only ~/start allows motion again.
+    The driver refuses motion commands until a zero command comes. If the monitor stops the robot a
+    second time, only ~/start allows motion again.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -109,9 +109,9 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """A velocity is a whole number of LSB in each word. The frame contains exactly these numbers.
+    """A velocity that is a whole number of LSB in each word is sent as exactly these numbers.
 
-    Velocities with harmful bytes are not tested, because the driver changes them.
+    Velocities with harmful bytes are left out, because the driver changes them.
     """
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
@@ -190,7 +190,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 ) -> None:
     """The driver computes the commanded velocity from the bytes that it has sent to the board.
 
-    The last frame counts. Zeros before a frame have no meaning.
+    If the bytes contain several frames, the last one counts. The zeros before a frame are ignored.
     """
     found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)

@@ -35,7 +35,10 @@ def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None
 
 
 def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
-    """Two poses agree that a displacement was wrong. The odometry is corrected in five steps."""
+    """A displacement was wrong. Two poses of the board agree with each other, but not with it.
+
+    The driver corrects the odometry in five steps.
+    """
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     odometry.displace(DisplacementReading(0.05, 0.0, 0.0, "earth", PERIOD_S, 0), 0.0)

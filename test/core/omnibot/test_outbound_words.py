@@ -77,17 +77,17 @@ def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
 def test_words_that_would_act_take_the_nearest_value_that_does_not(
     counts: tuple[float, float, float], typed: str
 ) -> None:
-    """Words with harmful bytes are changed to the nearest harmless ones.
+    """Some bytes in a word would act as a letter, or as part of a header.
 
-    The expected bytes are typed by hand.
+    The driver sends the nearest word without such bytes. The expected bytes are typed by hand.
     """
     assert payload(*harmless(counts)) == bytes.fromhex(typed)
 
 
 def test_everything_goes_out_behind_zeros() -> None:
-    """Zeros come before each frame and letter.
+    """Zeros come before each frame and each letter.
 
-    The zeros complete a frame that was cut, and wake a booted board.
+    They complete a frame that lost its end. They also wake a board that has just booted.
     """
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "

@@ -47,7 +47,10 @@ class Ticker:
 
 
 def all_of(port: int) -> Iterator[bytes]:
-    """Yield all bytes that a terminal holds, in pieces. One read may return only some of them."""
+    """Yield all bytes that a terminal holds, in pieces.
+
+    One read may return only a part of the bytes.
+    """
     with suppress(BlockingIOError):
         while data := os.read(port, 8192):
             yield data
@@ -55,10 +58,10 @@ def all_of(port: int) -> Iterator[bytes]:
 
 @pytest.mark.slow
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """No program reads the terminal.
+    """No program reads the terminal. The board continues to send.
 
-    The board continues, and the terminal keeps only the oldest bytes. These can be more than
-    ``UNREAD_LIMIT``, because a busy kernel counts bytes late.
+    The terminal keeps only the oldest bytes. It may keep more than ``UNREAD_LIMIT`` bytes, because
+    a busy kernel counts bytes late.
     """
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
@@ -198,9 +201,10 @@ def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "link to a file"])
 def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
-    """A file has the name that the link would have.
+    """The user wants a link, but a file or a link to a file already has its name.
 
-    The simulator keeps the file and ends with advice. No file descriptor is left open.
+    The simulator keeps the file, and ends with a message that says what to do. It leaves no file
+    descriptor open.
     """
     precious = tmp_path / "precious"
     precious.write_text("data")

@@ -125,7 +125,7 @@ def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
 
 
 def test_options_choose_the_robot_and_its_faults() -> None:
-    """A sim:// URL has the same options as the command line. They reach the controller."""
+    """A sim:// URL accepts the options of the command line, and passes them to the controller."""
     board, lines = options.from_url(
         "sim://?firmware=documented&volts=21.5&imu-dies=3&stuck=left&speed-per-unit=0.01"
         "&metres-per-count=0.001&motor-inequality=0.05&front=2&rear=1&dock=4&encoder-inverted"
@@ -188,7 +188,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The facts of the simulated controller, which the console shows, agree with its state."""
+    """The values that the console shows of the simulated controller agree with its state."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

@@ -53,7 +53,7 @@ def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board
 ) -> None:
     """The robot drives 0.6 m and stops when the commands end. Odometry is within 3 cm of the truth.
 
-    The driver sets other controller gains, because the robot would swerve with the board's own.
+    The driver replaces the board's own controller gains, because with these the robot would swerve.
 
     Then the board restarts. The driver writes the gains again, and the robot obeys new commands.
     The pose in odom continues from its value before the restart. The error is at most 8 cm, or at

@@ -29,7 +29,8 @@ NODE: Final = "omnibot_driver"
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
     """The services switch the LED on and off. The driver sends the ball command exactly once.
 
-    The board may miss this command, because it cannot receive while it sends.
+    The board may miss the ball command, because it cannot receive while it sends. Nevertheless, the
+    driver does not send it again.
     """
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
@@ -149,7 +150,7 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
 ) -> None:
     """The calibration tool records the ticks of both wheels during a drive, and stops the robot.
 
-    If the driver refuses a record, the tool reports the reason.
+    Then the e-stop is latched, so the driver refuses a record. The tool reports the reason.
     """
     leave_events_out(monkeypatch)
     ecu = ecu_of("firmware", stack, running=True)

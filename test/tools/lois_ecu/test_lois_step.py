@@ -51,7 +51,10 @@ def tuned() -> Tuned:
 
 
 def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Column]:
-    """Return simulated records of starts at full duty: the times in s between misplaced marks."""
+    """Return simulated records of starts at full duty.
+
+    A record has the times in s between the encoder's marks, which are misplaced.
+    """
     random = np.random.default_rng(seed)
     times_s = np.arange(0.0, 6.0, 1e-4)
     way = plant.final_rpm(100.0) * TICKS / 60 * turned(times_s, plant.slow_s, plant.fast_s)
@@ -95,7 +98,7 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
     """Misplaced marks change the times between ticks by 10 %. The fit finds the marks' places.
 
-    The rounding of the board's clock leaves an error of less than 1 %.
+    The remaining error is less than 1 %. It comes from the rounding of the board's clock.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -115,9 +118,9 @@ def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
 
 
 def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
-    """While the public firmware sends, it misses some ticks and times others late.
+    """The public firmware makes two errors while it sends, and they hardly change the fit.
 
-    This hardly changes the fit.
+    It misses some ticks, and it notices other ticks too late.
     """
     records = starts(PLANT, 8)
     for number, record in enumerate(records):
@@ -144,7 +147,8 @@ def test_records_that_are_too_short_are_refused() -> None:
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
     """An encoder has short and long ticks alternately, and the board has missed some edges.
 
-    The tool finds the correction of the short and of the long ticks, whichever kind comes first.
+    The tool finds a correction factor for the short ticks, and one for the long ticks. The first
+    tick may be a short or a long one.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -174,9 +178,10 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """The board sends data during a step, which delays its controller.
+    """On a board that sends data during a step, the overshoot is only a little larger than tuned.
 
-    The gains are tuned for an overshoot of at most 5 %. 95 % of the overshoots are below 8 %.
+    Sending delays the board's controller. The gains are tuned for an overshoot of at most 5 %. Of
+    the overshoots with a sending board, 95 % are below 8 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
@@ -288,10 +293,10 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """The times of a record have overflowed, so they are unknown. The tool refuses the record.
+    """The tool refuses a record whose numbers have overflowed, because the times are unknown.
 
-    The times are in the manual's unit, 100 ns, in which a number of the record can be at most 6.6
-    ms. The usual times between ticks are longer.
+    The unit of the manual is 100 ns. A number of the record can be at most 6.6 ms in this unit, and
+    the usual times between ticks are longer.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
@@ -309,7 +314,7 @@ def test_a_record_with_a_damaged_cell_is_refused(tmp_path: Path) -> None:
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
-    """The predicted control error of a step is larger with slow gains than with tuned gains."""
+    """The tool predicts a larger control error for slow gains than for tuned gains."""
     good = tuned().gains
     slow = PiGains(0.05, 2.0, 1.0)
     assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
