@@ -128,12 +128,12 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Change fields of SessionSettings. The others have their initial values."""
+        """Change these fields of SessionSettings. All other fields get their initial values."""
         self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Change fields of OmniBotSettings. The others have defaults that fit the board."""
+        """Change these fields of OmniBotSettings. Other fields get values that fit the board."""
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed

@@ -2,7 +2,8 @@
 
 """Compares published messages with the frames that the board sent.
 
-A message and a frame are both converted to a *key*: their values in the units of the frame.
+To compare a message with a frame, the module converts each of them to a *key*. A key has the values
+in the units of the frame.
 """
 
 import math

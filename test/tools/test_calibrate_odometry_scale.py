@@ -85,7 +85,10 @@ def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
 @pytest.mark.parametrize("subcommand", [geometry, scale])
 @pytest.mark.parametrize("before", [1.0, 1.2])
 def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
-    """Both subcommands find the true scales, for any former value of ``odom_linear_scale``."""
+    """``calibrate geometry`` and ``calibrate scale`` both find the true scales of the odometry.
+
+    The value that ``odom_linear_scale`` had before does not matter.
+    """
     robot = TwoWheels(odom_linear_scale=before)
     name = subcommand.__name__.rpartition(".")[2]
     found = subcommand.run(robot, answers(robot), arguments(name))

@@ -2,8 +2,8 @@
 
 """The Fejemis as a ``Board`` of the driver: its two Teensy boards appear as one robot.
 
-This module connects the parts of the package. It also composes the text lines that stop, start and
-pause the robot.
+This module connects the other modules of ``core/fejemis``. It also composes the text lines that
+stop, start and pause the robot.
 """
 
 import math

@@ -30,7 +30,9 @@ If the difference is larger, the user's measurements are regarded as wrong.
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One drive with the user's measurement. Units are m, m and unwrapped rad.
+    """One drive with the user's measurement.
+
+    Each pose has x and y in m, and the yaw in rad without wrapping.
 
     ``path``: odometry poses, (n, 3), until the robot is at rest.
 

@@ -248,7 +248,7 @@ def test_a_step_is_predicted_as_the_simulated_board_makes_it(
 ) -> None:
     """The tool's prediction of a step agrees with the step of a simulated board.
 
-    The board's controller runs 11 or 5 times a second, depending on the firmware.
+    This holds for each firmware, although its controller may run 11 or 5 times a second.
     """
     motor = MotorSettings(
         rpm_per_percent=0.66,
