@@ -27,15 +27,16 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
 rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Weight of the misfit of a message that seems too early for a sender: 1 s too early fits as badly
-as 10 s too late. A message is assigned to the sender that it fits best."""
+"""Ratio of two misfits (``_Sender.misfit_s``): 1 s too early for a sender fits as badly as 10 s too
+late. A message is assigned to the sender that it fits best."""
 ALIKE_S: Final = 0.02
-"""Two senders fit a message equally well if their misfits differ by at most this time, in s. The
-message is then assigned to the sender with the higher last message number."""
+"""Two senders fit a message equally well if their misfits (``_Sender.misfit_s``) differ by at most
+this time, in s. The message is then assigned to the sender whose last message had the higher
+number."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages after which the offset of a sender is regarded as known. Before that, perhaps
-all messages were delayed."""
+"""Number of messages after which the offset of a sender's clock is regarded as known. If there are
+fewer messages, all of them may have been delayed."""
 
 Differences = tuple[float, float]
 """Arrival by our clock minus sending by the sender's clock, in s. The first value is by our time of
@@ -140,7 +141,8 @@ class Transit:
 class _Sender:
     """One sender on a topic.
 
-    It has two offsets from the sender's clock: of our time of day, and of our steady clock.
+    It stores two offsets: that of our time of day from the sender's clock, and that of our steady
+    clock from the sender's clock.
     """
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
@@ -174,7 +176,10 @@ class _Sender:
 
 
 class _Offset:
-    """The offset of one of our clocks from a sender's clock: the smallest difference so far."""
+    """The offset of one of our two clocks from a sender's clock.
+
+    It is the smallest difference so far between arrival (our clock) and sending (sender's clock).
+    """
 
     def __init__(self, difference_s: float, at_s: float) -> None:
         self._least_s, self._least_at_s = difference_s, at_s
@@ -191,7 +196,7 @@ class _Offset:
         return difference_s - self._least_s - self._drift_s(at_s)
 
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest possible misfit of a message, by this offset alone.
+        """Return the smallest and the largest possible misfit of a message to this one offset.
 
         ``_Sender.misfit_s`` explains the misfit.
         """

@@ -57,7 +57,7 @@ LINE: Final = (
         0.5,
         "s",
         "Time until the driver tries to open a lost port again. After each failure, this time"
-        " grows by half, up to 2 s. A value above 2 s does not grow.",
+        " grows by half, up to 2 s. If this parameter is above 2 s, the time does not grow.",
         low=0.05,
         high=60.0,
     ),

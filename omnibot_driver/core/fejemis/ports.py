@@ -66,7 +66,7 @@ class Ports:
     def half(self, role: Role) -> Half | None:
         """Return the board that has the ``role``.
 
-        Return None if no board or each of the two boards has it.
+        Return None if neither board has this role, or if both boards have it.
         """
         first, second = self.halves
         if first.role == role:
@@ -116,7 +116,10 @@ class Ports:
         return NO_PACKETS if half is None else self.at(self.halves.index(half), *texts)
 
     def ending(self, role: Role, *texts: bytes) -> Packets:
-        """Return lines that stop or switch off something, for each port where the board may be."""
+        """Return lines that stop or switch off something on the board with this ``role``.
+
+        If its port is unknown, the lines go to each port where this board may be.
+        """
         if self.half(role) is not None:
             return self.line(role, *texts)
         unknown = [channel for channel, half in enumerate(self.halves) if half.role is None]

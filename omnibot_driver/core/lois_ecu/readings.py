@@ -41,7 +41,7 @@ class HeadingReading:
 
 @dataclass(frozen=True, slots=True)
 class RecordReading(Unstamped):
-    """A record that was requested.
+    """A requested record that has arrived completely.
 
     ``count_s``: time unit of an RPM record in s, None while unknown.
     """

@@ -32,8 +32,11 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The terminal mode that was written last. None if the board's own messages have arrived
-        since then."""
+        """The terminal mode that was written last.
+
+        None in a new connection, and after a message that the board sends only outside terminal
+        modes.
+        """
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping: dict[str, str] = {}
         """Changes that wait until the robot has been stopped: new values of parameters, by name."""
@@ -143,7 +146,7 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """Record a message of the board's own, which shows that no terminal mode is active."""
+        """Record a message that the board sends only outside terminal modes: none is active now."""
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:

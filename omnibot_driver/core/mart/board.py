@@ -51,7 +51,7 @@ TRAITS: Final = Traits(
 ANSWERED: Final = NoticeReading("", halt=False)
 """A reading without effect, which only shows that the server answers.
 
-The reading NOTHING_MEASURED would also make the motion monitor forget its earlier measurements.
+NOTHING_MEASURED is not used here: it makes the motion monitor forget its earlier measurements.
 """
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
@@ -86,8 +86,8 @@ class MartBoard(Board):
     def mode(self) -> Mode:
         """The mode of the board.
 
-        The mode becomes nominal when the server has answered the first stop. There are two
-        exceptions: the server is lost, or HELLO has shown that it is another kind of server.
+        The mode becomes nominal when the server has answered the first stop. It stays unknown if
+        the server is lost, or if the reply to HELLO has shown that it is another kind of server.
         """
         return self._mode
 
@@ -192,7 +192,7 @@ class MartBoard(Board):
     def actuator(self, proof: StopProof) -> "Conductor":
         """Return the actuator.
 
-        The pilot records each stop and each start of the robot in ``proof``.
+        The ``Pilot`` behind it records each stop and each start of the robot in ``proof``.
         """
         self._pilot.proof = proof
         return Conductor(self._pilot)
@@ -200,7 +200,7 @@ class MartBoard(Board):
     def wake(self) -> Packets:
         """Return the commands that stop the robot at the beginning of a connection.
 
-        The pilot repeats them until the server answers, before other requests.
+        The ``Pilot`` repeats them until the server answers. Its other requests come after that.
         """
         return self.stop()
 
@@ -279,7 +279,7 @@ class Conductor:
         )
 
     def connect(self) -> None:
-        """Do nothing, because ``MartBoard.connect`` has already reset the pilot."""
+        """Do nothing, because ``MartBoard.connect`` has already reset the ``Pilot``."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
         """Carry out ``wanted`` from now on, instead of the previous command."""

@@ -16,7 +16,7 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.turn_angle import TurnAngle
 
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations of a motion that is not measured while the connection is lost.
+"""Assumed standard deviations of the robot's motion during a lost connection (not measured).
 
 ``UNHEARD_M``: position, in m. ``UNHEARD_RAD``: heading, in rad.
 """
@@ -64,7 +64,7 @@ class CorrectedPose:
         self._correct_yaw(self.turn.tell(told_rad))
 
     def turn_recorded(self, degrees: float) -> bool:
-        """Correct the heading after a controlled turn by the angle that the server has recorded.
+        """Correct the heading after a controlled turn, with the angle in the server's record of it.
 
         ``degrees``: this angle, with the server's sign. Return whether the angle was used.
         """
@@ -113,9 +113,10 @@ class CorrectedPose:
     def _end_turn(self, *, may_be_recorded: bool) -> float:
         """End a turn on the spot, and return the correction of its angle in rad.
 
-        An angle that the server has reported can be implausible for two reasons: it belongs to
-        another motion, or only one of the wheels has turned. So the whole difference between this
-        angle and the angle computed from the encoder count is added to the uncertainty.
+        If the angle from the server is implausible, the angle from the encoder count replaces it.
+        Otherwise the correction is zero. There are two possible reasons: the server's angle belongs
+        to another motion, or only one of the wheels has turned. So the whole difference between the
+        two angles is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

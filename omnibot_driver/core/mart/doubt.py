@@ -45,11 +45,11 @@ turns, it is multiplied by the angle in rad.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Random error of a turn that is computed from the commands, as a fraction of its constant error.
+"""Ratio of the random to the constant error of a turn that is computed from the commands.
 
-Both errors are standard deviations. The constant error comes from an error of the assumed wheel
-speed ratio. It has the same sign in all intervals between two encoder counts. The random errors of
-different intervals are independent.
+Both errors are standard deviations. The constant error comes from the assumed wheel speed ratio, so
+it has the same sign in all intervals between two encoder counts. The random errors of different
+intervals are independent.
 """
 ASTRAY: Final = 0.7
 """Factor for the error of a driven distance that an uncertain heading causes.
@@ -63,7 +63,7 @@ SPREAD: Final = 0.3
 It is a fraction of the interval's length. The exact value is 1/√12.
 """
 CLOCK_S: Final = 0.01
-"""Least assumed uncertainty of a reply's time, in s. A good network has this uncertainty."""
+"""Uncertainty of a reply's time on a good network, in s. No smaller value is assumed."""
 Errors = list[tuple[float, float, float, float]]
 
 
@@ -133,16 +133,16 @@ class Doubt:
     def begin(self) -> None:
         """Store the constant heading error of all computed turns so far, because a motion begins.
 
-        If the server reports the heading during this motion, ``heading_told`` goes back to the
-        stored error. This removes the constant error that the motion has added.
+        If the server reports the heading during this motion, ``heading_told`` restores the stored
+        error. The constant error that this motion has added is then removed.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
         """Remove the constant heading error of this motion: the server now reports the heading.
 
-        Until now, the turn of this motion was computed from the commands. The random heading error
-        of this turn remains, and so does the position error that the turn has caused.
+        Before this report, the turn of this motion was computed from the commands. The random
+        heading error of this turn remains. The position error that it has caused remains, too.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -157,7 +157,7 @@ class Doubt:
         self._walk = self._walk.with_errors(_around(m2, rad2))
 
     def end(self) -> None:
-        """Add the errors that each motion has at its beginning and its end."""
+        """Add the errors that the start and the coasting of the ended motion have caused."""
         self.add(END_M**2, END_RAD**2)
 
     def end_straight(self) -> None:
@@ -175,9 +175,8 @@ class Doubt:
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
         """Replace the heading error of the last turn by the error of the recorded angle.
 
-        Until now, the odometry has used the angle that the wheel measured. From now on, it uses the
-        angle that the server has recorded, which comes from the gyro. Call this before the position
-        changes.
+        The angle that the wheel measured is replaced by the angle that the server has recorded,
+        which comes from the gyro. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
@@ -211,7 +210,10 @@ def _by_gyro(told_rad: float) -> float:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors of x, y (m) and heading (rad) with these standard deviations."""
+    """Return independent errors of x and y (``way_m``), and of the heading (``turn_rad``).
+
+    The arguments are standard deviations.
+    """
     return _around(way_m * way_m, turn_rad * turn_rad)
 
 

@@ -28,8 +28,8 @@ before RM, it may have been measured before RM, and its reply may be late.
 MOST_RAD: Final = 1e7
 """Size in rad from which a reported heading is rejected.
 
-After its clock was set back, the server may report 1e15 degrees, for example. It integrates the
-turn rate over unsigned milliseconds, and a negative time becomes huge.
+The server integrates the turn rate over unsigned milliseconds. If the server's clock was set back,
+the time is negative and becomes huge. The server then reports 1e15 degrees, for example.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is predicted after its last report."""
@@ -44,8 +44,8 @@ class RelativeHeading:
 
     ``told_s``: time of the last accepted heading.
 
-    ``from_s``: earliest time at which the server may have measured a heading. This heading is the
-    last one that certainly answers its own query (RMRA), not an earlier query.
+    ``from_s``: earliest time at which the server may have measured the last certain heading. A
+    heading is certain if it surely answers its own query (RMRA), and not an earlier query.
 
     ``changed_s``: time of the last change of heading.
 

@@ -127,9 +127,9 @@ class Starts(FailedStarts):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return True if ``start`` is a controlled move and an earlier HELLO may arrive after it.
 
-        The server might answer this HELLO just before it executes a copy of the move. The answer
-        would then wrongly suggest that there is no copy. The driver waits before a check of the
-        IMU, so no earlier HELLO can arrive after a fresh check.
+        The server might answer that HELLO just before it executes a duplicate of the move. The
+        driver would then wrongly conclude that there is no duplicate. After a fresh check of the
+        IMU, no earlier HELLO can arrive, because the driver waits before such a check.
         """
         moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
         return moves and now < self._greeted_s + self._delay_s

@@ -157,7 +157,8 @@ Before it, some servers turn the robot for 0.5 s.
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
 """Commands whose duplicate does harm if it arrives after another motion has begun.
 
-Before the next start, the driver waits until no duplicate can come. Then it checks the IMU.
+So before the next start, the driver waits until no duplicate can arrive. After that it checks the
+IMU, if the start needs this check.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

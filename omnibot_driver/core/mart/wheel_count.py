@@ -50,8 +50,8 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last count, if it shows that the start command may be lost; otherwise 0. It shows
-    this if it differs by at most 1 from the count before the start command.
+    ``maybe``: the last reported count, if it differs by at most 1 from the count before the start
+    command; otherwise 0. Such a count shows that the start command may be lost.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class WheelCount:
         self._same = self._odd = 0
 
     def begin(self) -> None:
-        """Record that a start was sent. The count begins at zero if the start has arrived."""
+        """Record that a start command was sent. If it arrives, the count begins at zero again."""
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
         self.certain = self._confirmed = False
@@ -118,7 +118,7 @@ class WheelCount:
         *,
         rests: bool,
     ) -> Step | None:
-        """Process a count; return the step since the last count, or None for an implausible count.
+        """Process a reported count; return the step since the last one, or None if implausible.
 
         ``stood_s``: time at which the robot was stopped; infinite while it is driven. ``rests``:
         whether the last motion is over.

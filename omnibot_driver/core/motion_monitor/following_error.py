@@ -4,8 +4,8 @@
 
 The *envelope* is the set of velocities that recent set-points allow (``envelope.py``). The error is
 the sum of the motion outside the envelope. A displacement inside the envelope resets the error to
-0. A single damaged displacement or a short jerk cannot reach the limit. This module knows
-velocities in the board's own axes, and times; it does not know which fault an error shows.
+0. A single damaged displacement or a short jerk cannot raise the error above its limit. This module
+knows velocities in the board's own axes, and times; it does not know which fault an error shows.
 """
 
 from typing import Final
@@ -34,6 +34,8 @@ So the error exceeds its limit only after three displacements in a row, or after
 
 class FollowingError:
     """The following error of one robot: the sum of its motion outside the envelope.
+
+    The envelope is the set of velocities that recent set-points allow.
 
     * ``slack_mps``, ``slack_radps``: tolerated excess of a velocity over the envelope, in m/s and
       rad/s.

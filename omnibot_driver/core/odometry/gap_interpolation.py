@@ -32,10 +32,11 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Return two tangents in body axes: of all lost displacements together, and of ``reading``.
+        """Return two tangents (twist x time) in body axes.
 
-        A tangent is twist x time. ``heading_rad``: heading before the losses; None if no pose has
-        arrived. Without a heading, ``reading`` is taken to be in body axes.
+        The first is that of all lost displacements together, the second that of ``reading``.
+        ``heading_rad``: heading before the losses; None if no pose has arrived. If it is None,
+        ``reading`` is assumed to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

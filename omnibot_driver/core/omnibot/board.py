@@ -125,10 +125,10 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended, relative to the IMU frames of the stream; None if unknown.
+        """Where the last read ended in the stream of IMU frames; None if unknown.
 
-        The place is computed from the bytes that are not decoded yet, because these may be the
-        beginning of an IMU frame.
+        The bytes that are not decoded yet show this place, because they may be the beginning of an
+        IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -234,11 +234,11 @@ class OmniBot:
         return SetpointStream(self._encoder, proof)
 
     def wake(self) -> Packets:
-        """Return Stop; the zero bytes before it wake the board."""
+        """Return Stop. The packet begins with zero bytes, which wake the board."""
         return packed(STOP)
 
     def start_requested(self) -> None:
-        """Do nothing: ``start`` is the same, whether the user or the driver requests the start."""
+        """Do nothing: a start by the user needs the same bytes as a start by the driver."""
 
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""

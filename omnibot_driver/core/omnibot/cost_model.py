@@ -98,7 +98,7 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g if one of its words has the bytes of an IMU header.
 
-In this case, the supposed header of the frame was probably a gyro value of -6 in another frame.
+Such a frame is probably misread: what looks like its header is a gyro value of -6 of another frame.
 """
 JUMP: Final = 2.5
 """Cost of a counter that did not advance by one. It is the cost of the explanation that an earlier
@@ -134,8 +134,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which no delta is expected any more. It applies until the first
-delta arrives: at the beginning of a stream, and after damage."""
+"""Number of missing deltas after which no delta is expected any more. This rule ends with the first
+delta. It is used at the beginning of a stream, and again after damage."""
 
 
 class Context(NamedTuple):
@@ -156,7 +156,7 @@ class Context(NamedTuple):
     def damaged(self) -> "Context":
         """Return the context after an unknown number of frames were lost.
 
-        The sequence number, the pose and the sum of turns are then unknown.
+        The sequence number, the pose and the sum of the deltas' turns are then unknown.
         """
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
@@ -176,7 +176,7 @@ class Expectation:
         self.largest_delta = round(FASTEST * schedule.delta_period_s)
         """Largest possible delta in 0.1 mm or 0.1 mrad: 4000 for 40 ms."""
         self.rounding = ROUNDING + ROUNDING_PER_DELTA * schedule.deltas_per_pose
-        """Largest rounding error of the sum of the deltas from pose to pose, in 0.1 mrad."""
+        """Largest rounding error of the sum of the deltas between two poses, in 0.1 mrad."""
         self._lightest = (0.5 * counts_per_g) ** 2
         self._heaviest = (2.5 * counts_per_g) ** 2
         self._accel_scatter = 300.0
@@ -186,12 +186,12 @@ class Expectation:
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
         """Limits of an IMU frame's content. Within these limits, the content has no cost.
 
-        The values are the least and the largest squared acceleration, and the largest change of an
-        acceleration word and of a gyro word. They are in counts, as integers, which compare faster.
+        In order: the least and the largest squared acceleration, the largest change of an
+        acceleration word and of a gyro word. All are integers in counts: integers compare faster.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
-        """Return the cost of a complete frame's content, and what is known after the frame."""
+        """Return the cost of a complete frame's content, and the context for the next frame."""
         if type(frame) is ImuFrame:
             last, seq, pose, imus, deltas, shaken, turned = before
             ax, ay, az = frame.accel
@@ -283,9 +283,9 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    This is possible only if the byte occurs in headers. For an IMU frame there is a second
-    condition: the byte is FF, or the frame's last word differs from the last word of the previous
-    IMU frame.
+    This is possible only if the byte occurs in headers. For an IMU frame, there are two further
+    cases, and one must be true: the byte is FF, or the frame's last word differs from the last word
+    of the previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

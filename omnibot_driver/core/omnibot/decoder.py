@@ -37,8 +37,8 @@ SPOKEN_AGAINST: Final = 3.0
 """Least cost of a frame's content at which the frame must wait. The bytes after the frame then
 decide whether it is accepted."""
 DOUBT_BYTES: Final = 170
-"""Number of uncertain bytes at which the decoder must decide. In nominal mode, the board sends this
-number in 100 ms."""
+"""Largest number of uncertain bytes. When it is reached, the decoder decides about their first half.
+In nominal mode, the board sends this number of bytes in 100 ms."""
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Least number of bytes for which the fast path is tried: the length of the shortest frame."""
 CALM_S: Final = 10.0
@@ -47,7 +47,7 @@ CALM_S: Final = 10.0
 On a calm line, the decoder needs less evidence to accept the last byte of a frame.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""Number of certain frames that must follow an uncertain frame before it is discarded."""
+"""Number of certain frames after which the decoder discards an uncertain frame before them."""
 
 
 @dataclass(slots=True)
@@ -63,8 +63,8 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    The faster code in ``single_imu`` decodes some frames instead of this class. It must update
-    these attributes:
+    The faster code in ``single_imu`` decodes some frames instead of this class. That code must
+    update these attributes:
 
     * ``context``: what is known from the frames so far.
     * ``expectation``: which content the next frame may have.
@@ -81,7 +81,7 @@ class FrameDecoder:
     ) -> None:
         self.statistics = DecoderStatistics()
         self.skipped: list[int] = []
-        """Number of discarded bytes right before each frame that the last call has returned."""
+        """Number of discarded bytes right before each frame that ``feed`` or ``flush`` returned."""
         self.at_rest = False
         """Whether all received bytes are decoded, and the line normally pauses only between frames.
 
@@ -221,7 +221,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether the arrival times allow that the last byte held begins another frame.
+        """Return whether the last byte held may begin another frame. The arrival times show it.
 
         ``start``, ``length``: position and length of the last frame held. ``due``: whether another
         frame may follow this frame directly.
@@ -240,9 +240,9 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of ``walk`` except the last two, because the bytes after them are odd.
+        """Accept the frames of ``walk``, but not the last two: the bytes after those are odd.
 
-        Always return False, so that ``_walk`` can return the result of this method.
+        Always return False. ``_walk`` returns this value to report an uncertain frame.
         """
         believed = len(walk.frames) - 2
         if believed > 0:
@@ -299,8 +299,8 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
-        A frame is decided if later bytes cannot change the decision. A frame that ends at the
-        position ``until`` or before is decided too.
+        A frame is decided in two cases: later bytes cannot change the decision, or the frame ends
+        at the position ``until`` or before.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

@@ -53,15 +53,15 @@ them. So they did not wait for the reader.
 FEW_BYTES: Final = 2
 """How fast bytes arrive can be measured only if there are more bytes than this number."""
 TICKS_TO_PROVE: Final = 2
-"""Number of late ticks after a first late tick that prove that bytes were lost.
+"""Number of further late ticks, after a first late tick, that prove that bytes were lost.
 
-Each of these ticks must be in a separate read, and must be as late as the first late tick. After a
-pause of ``IDLE_S`` or more, one such tick is enough.
+Each further tick must be in a separate read, and must be as late as the first late tick. After a
+pause of ``IDLE_S`` or more, one further tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Number of bytes after a frame within which the cause of a pause in the frame must be found.
 
-If these bytes do not prove an idle line, the reader is assumed to have been late.
+If these bytes do not prove that the line was idle, the reader is assumed to have been late.
 """
 
 
@@ -170,10 +170,10 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause within a frame, found from the next frame, at ``start``.
+    """Return the cause of a pause within a frame. The frame after it shows the cause.
 
-    The line was idle if the next frame also contains a pause, and the two pauses end a whole number
-    of ticks apart. ``first``: the read that ended the first of the two pauses.
+    The line was idle if that frame also contains a pause, and the two pauses end a whole number of
+    ticks apart. ``start``: position of that frame. ``first``: the read that ended the first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

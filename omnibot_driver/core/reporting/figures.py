@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The figures that the diagnosis is made from: of the link, the board and the commands."""
+"""The figures for the diagnostics: of the link, the board, its readings and the commands."""
 
 from dataclasses import dataclass
 

@@ -37,12 +37,12 @@ class Imu:
         self._samples: list[Vector] = []
 
     def boot(self) -> None:
-        """Reset the orientation, and cancel the running calibration."""
+        """Reset the orientation, and cancel a calibration that is in progress."""
         self.orientation = (0.0, 0.0, 0.0)
         self._kind, self._samples = "", []
 
     def cycle(self, step_s: float, config: DriveConfig) -> None:
-        """Integrate the yaw over one step, and continue the running calibration."""
+        """Integrate the yaw over one step, and continue a calibration that is in progress."""
         truth = self._vehicle.truth
         bias_dps = self._settings.gyro_bias_dps[2] - config.gyro_offset_dps[2]
         roll, pitch, yaw = self.orientation
