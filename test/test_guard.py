@@ -83,7 +83,8 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
     """The driver changes the board's stop bytes, because they depend on the state of the board.
 
-    The driver's guard process writes the new bytes, and so does the next guard process.
+    The present guard process writes the new bytes. If another guard process replaces it, that
+    process writes the new bytes, too.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -129,7 +130,7 @@ def test_the_last_packets_of_an_orderly_end_are_not_discarded(
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """Old commands fill the port's buffer. The guard process discards them, so the stop bytes fit.
 
-    The test reads nothing before the guard's end.
+    The test reads the stop bytes only after the guard process has ended.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
@@ -262,8 +263,8 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
     """Heartbeats and stop bytes come through one pipe. The guard process distinguishes them.
 
-    A read may end anywhere. A lone ``e`` is a heartbeat with a latched e-stop. Stop bytes may
-    contain an ``e``, too.
+    It does so wherever a read ends. An ``e`` outside the stop bytes is a heartbeat with a latched
+    e-stop. An ``e`` within the stop bytes is a part of them.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

@@ -2,7 +2,8 @@
 
 """Tests of a zero command that arrives too late while the robot drives to a goal.
 
-A goal does not expire, and a joystick that is released sends its zero command only once.
+Such a command usually ends the goal, although the driver refuses it. The reasons: a goal does not
+expire, and a joystick that is released sends its zero command only once.
 """
 
 import math
@@ -81,9 +82,9 @@ def source(bench: Any) -> str | None:
 
 
 def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
-    """Return a bench whose MART drives to a goal, and the topic cmd_vel of its driver.
+    """Return a bench with a MART that drives to a goal, and the topic cmd_vel of its driver.
 
-    Before the goal, a zero command arrived on this topic.
+    A zero command arrived on this topic before the goal was commanded.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)
@@ -101,9 +102,10 @@ def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
 def test_a_late_zero_is_refused_but_ends_a_goal(
     action: Action, late_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The network delays the zero of a released joystick by 0.7 s.
+    """The zero command of a released joystick is too old when it arrives. The driver refuses it.
 
-    The goal ends, the robot stops well before it, and a notice gives the reason.
+    But the driver ends the drive to the goal. The robot stops well before the goal, and a notice
+    gives the reason.
     """
     bench, topic = on_the_way(monkeypatch)
     topic.action = action

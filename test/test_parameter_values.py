@@ -21,7 +21,7 @@ WHOLE = [
     for parameter in RANGED
     if parameter.kind is float and math.floor(parameter.high) >= parameter.low
 ]
-"""Float parameters with an integer in their range."""
+"""Float parameters whose range contains at least one integer."""
 CHOICES = [row for row in PARAMETERS.rows if row.choices and not row.is_list]
 FRAMES = [parameter for parameter in PARAMETERS.rows if parameter.name.endswith("_frame")]
 

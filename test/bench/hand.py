@@ -2,8 +2,8 @@
 
 """Command several robots in turn, 40 times a second each, for a number of seconds.
 
-Arguments: seconds and namespaces. Output: a JSON list with an array for each namespace. Each
-command has the steady clock's time in s and the speed in the board's units.
+Arguments: seconds and namespaces. Output: a JSON list with one array for each namespace. The array
+has an item for each command: the steady clock's time in s, and the speed in the board's units.
 """
 
 import json

@@ -23,7 +23,8 @@ from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
 """Shares of one core that are measured one after the other.
 
-The driver gets such a share, and so does the floor, the smallest program with the same output.
+In each measurement, the driver and the floor get one such share each. The floor is the smallest
+program with the same output.
 """
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
@@ -63,9 +64,9 @@ class Group:
 
     @contextmanager
     def joined(self) -> Iterator[None]:
-        """Move this process into the group within a ``with`` block.
+        """Move the calling process into this group of processes for a ``with`` block.
 
-        Processes that are started in the block belong to the group, too.
+        Processes that it starts in the block belong to the group, too.
         """
         self._members.write_text(str(os.getpid()))
         try:
@@ -74,7 +75,7 @@ class Group:
             self._root.write_text(str(os.getpid()))
 
     def give(self, part: float) -> None:
-        """Limit the group to the share ``part`` of one core, where 1 is the whole core."""
+        """Limit this group of processes to the share ``part`` of one core (1: the whole core)."""
         run_us, period_us = round(1e6 * RUN_S), round(1e6 * RUN_S / part)
         if self._is_first:
             self._write("cpu.cfs_quota_us", -1)

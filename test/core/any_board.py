@@ -114,7 +114,7 @@ def lois_ecu(firmware: str) -> tuple[Board, Any]:
 
 
 class MartRobot:
-    """The simulated MART controller. Five of its ticks are one tick of the bench."""
+    """The simulated MART controller. It runs five of its own ticks in one tick of the bench."""
 
     def __init__(self, firmware: Any) -> None:
         from omnibot_driver.simulator.mart import QUIRKS, MartSettings, SimulatedMart
@@ -147,7 +147,7 @@ def mart(firmware: str) -> tuple[Board, Any]:
 
 
 class FejemisRobot:
-    """The simulated Fejemis. Five of its ticks are one tick of the bench."""
+    """The simulated Fejemis. It runs five of its own ticks in one tick of the bench."""
 
     def __init__(self, sums: bool) -> None:
         from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis

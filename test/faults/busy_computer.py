@@ -25,8 +25,7 @@ TICKS: Final = 3000
 SILENCE_S: Final = 1.0
 """Shortest interruption of the data, in s, after which the driver is allowed to blame the cable."""
 TRANSIT: Final = 200
-"""Number of frames, sent before the comparison begins, whose messages may arrive after it begins.
-"""
+"""Number of frames that are sent before a comparison begins, but may be published after that."""
 REACH: Final = 200
 """Number of sent frames with which a published message is compared.
 
@@ -124,8 +123,9 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages match no frame, and how many frames are skipped between matches.
 
-    Messages and frames are compared in order. If several frames equal the first message, one
-    comparison begins at each of these frames. The result with the fewest errors is returned.
+    Messages and frames are compared in order, beginning at a frame that equals the first message.
+    If several frames equal it, all of them are tried as the beginning. The result with the fewest
+    errors is returned.
     """
     starts = [n for n, key in enumerate(sent) if published and same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

@@ -36,7 +36,7 @@ class NetworkRig(Rig):
 class GoalRig(Rig):
     """A rig whose board is under position control.
 
-    It drives to goals and does not obey velocities.
+    The board drives to goals and does not obey velocities.
     """
 
     def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:

@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A rig: a real driver process on a breakable line, a commander, and checks of robot and driver."""
+"""A rig for tests of faults, with checks of the robot and of the driver.
+
+The rig runs a real driver process, a line to the board with faults, and a commander. The commander
+sends motion commands.
+"""
 
 import math
 import os

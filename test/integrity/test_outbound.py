@@ -24,7 +24,7 @@ STOP = bytes.fromhex("FF FE 02 00 00 00 00 00 00")
 
 
 class Losing:
-    """A line that loses the bytes with these numbers, counted over all writes."""
+    """A line that loses the bytes at the given positions, counted from 0 over all writes."""
 
     def __init__(self, *numbers: int) -> None:
         self.whole = 0
@@ -36,7 +36,10 @@ class Losing:
 
 
 def on_all_receivers(course: Course, line: Line) -> Score:
-    """Run a course with the same damage on each receiver, and return the sum of the scores."""
+    """Send the writes of a course to each kind of receiver; return the sum of the scores.
+
+    The line damages the writes in the same way for each receiver.
+    """
     total = Score()
     for receiver in RECEIVERS:
         for _, board in boards(course.scene.kind, receiver):
@@ -45,7 +48,7 @@ def on_all_receivers(course: Course, line: Line) -> Score:
 
 
 def shown(score: Score) -> str:
-    """Return a text with the counts of a score, and with the bytes that led to its errors."""
+    """Return a score as a text: its counts, and the bytes that led to the counted errors."""
     return "\n".join([str(score), *map(str, score.examples)])
 
 
@@ -53,7 +56,7 @@ def shown(score: Score) -> str:
 def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
     """The line is undamaged.
 
-    Receivers understand only what was sent, and the robot stops in time.
+    Each kind of receiver obeys only what the driver has sent, and the robot stops in time.
     """
     course = Course(ENDED[scene](Random(scene)))
     score = on_all_receivers(course, GOOD)
@@ -63,9 +66,10 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """One script of each scene is run with all receivers. The bounds of the report hold.
+    """The results of a short run are within the bounds of the outbound report.
 
-    Bounds on rates are not checked, because a short run has too few frames.
+    One script of each scene is run with each kind of receiver. Bounds on rates are not checked,
+    because a short run has too few frames.
     """
     scores, _ = one(0.025, (scene, 0), LOSSES)
     for fault in LOSSES:
@@ -190,7 +194,7 @@ def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
 
 
 def test_a_write_is_read_by_the_layout_alone() -> None:
-    """The parser finds zeros, frames and letters. Anything else raises ValueError."""
+    """The parser splits a write into zeros, frames and letters. Other bytes raise ValueError."""
     items = parse(bytes(8) + STOP + bytes(8) + b"S")
     assert items.frames == ((16, 2, (0, 0, 0)),)
     assert items.letters == ((25, 0x53),)
@@ -199,10 +203,10 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """Without the name of a scene, ``over`` adds the scores of all scenes that end a drive.
+    """Without a scene's name, ``over`` adds the scores of all scenes in which the robot must stop.
 
-    With the name of a scene, it adds only the scores of this scene, also if this scene does not end
-    its drive.
+    With the name of a scene, it adds only the scores of this scene, even if the robot need not
+    stop in it.
     """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),

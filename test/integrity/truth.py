@@ -60,7 +60,7 @@ class Setpoint:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """The motion of a robot, and what its sensor reads at rest."""
+    """How a robot moves, what its IMU reads at rest, and whether its board is paused at times."""
 
     driving: bool = False
     imu_only: bool = False

@@ -32,7 +32,7 @@ _nursery = Nursery()
 
 
 class Driver:
-    """The driver as a separate process in a namespace, by default an unused one.
+    """The driver as a separate process, by default in a namespace that no other driver uses.
 
     It is forked from a process that has already imported the driver, except with ``interpreter``.
 

@@ -161,7 +161,10 @@ def marked(mark: str, name: str = "") -> list[int]:
 
 
 def wait_until_all_have_ended(mark: str) -> None:
-    """Wait until all processes with the mark have ended. A guard ends after its driver."""
+    """Wait until all processes with ``mark`` in their environment have ended.
+
+    Waiting is necessary, for example because a guard ends later than its driver.
+    """
     for pid in marked(mark):
         try:
             process = os.pidfd_open(pid)
@@ -234,7 +237,7 @@ def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
 ) -> None:
     """The demo runs for a robot without an IMU that cannot drive sideways.
 
-    The text mentions turns at the corners, and no IMU data.
+    Its text says that the robot turns at the corners. It does not mention IMU data.
     """
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     page = "docs/boards/cart.md"
@@ -285,7 +288,7 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 def test_on_a_terminal_the_monitor_shows_it() -> None:
     """The demo runs on a terminal. The monitor shows the driver.
 
-    When the user quits the monitor, the result follows.
+    When the user quits the monitor, the demo prints its result.
     """
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")
@@ -299,7 +302,7 @@ def test_on_a_terminal_the_monitor_shows_it() -> None:
 def test_a_signal_on_the_way_ends_it_cleanly() -> None:
     """SIGINT arrives during the drive. The demo prints its result and exits with code 0.
 
-    No process of the demo is left. The next test sends SIGTERM.
+    No process of the demo is left. (Another test sends SIGTERM instead of SIGINT.)
     """
     with running_demo() as (process, mark):
         read_until_it_drives(process)

@@ -77,9 +77,9 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def test_the_gyro_is_calibrated_saved_and_loaded_again(
     robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """``~/calibrate_gyro`` reports the simulated gyro's bias and saves it in the file.
+    """``~/calibrate_gyro`` reports the simulated gyro's bias and saves it in the calibration file.
 
-    Another driver loads it from the file.
+    Another driver then loads the bias from this file.
     """
     planted = [math.radians(value) for value in PLANTED_DPS]
     answer = robot.probe.call(Trigger, "calibrate_gyro")
@@ -124,16 +124,16 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 def test_the_bias_is_what_was_set_last(
     start_board: Callable[..., PtyBoard], start_driver: Callable[..., Driver], probe_of: Any
 ) -> None:
-    """The driver has refined the gyro bias at rest, and the user sets ``gyro_bias``.
+    """The driver has refined the gyro bias at rest. Then the user sets ``gyro_bias``.
 
-    The user's value is used, even if the parameter had the same value before.
+    The driver uses the user's value, even if the parameter had this value before.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
     imu = probe.listen(Imu, "imu/data_raw")
 
     def rate() -> float:
-        """Return the mean of the last 20 rates about z, divided by the planted bias."""
+        """Return the IMU's mean yaw rate of 20 messages, divided by the simulated gyro's bias."""
         mean = sum(message.angular_velocity.z for message in imu[-20:]) / 20
         return mean / math.radians(PLANTED_DPS[2])
 
@@ -181,7 +181,8 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     def keeps_pace() -> bool:
         """Return whether the IMU rate is right.
 
-        After a stall of the computer, this rate is first too low, then too high.
+        The test waits for this. After a stall of the computer, the rate is first too low and then
+        too high.
         """
         if (status := robot.status("Stream")) is None:
             return False
@@ -248,7 +249,7 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
 ) -> None:
     """With ``use_sim_time``, measurements wait until /clock has a time.
 
-    A simulated board does not follow /clock, so its measurements wait, too.
+    This also applies to a simulated board, although it runs in real time.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

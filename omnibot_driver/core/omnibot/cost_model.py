@@ -283,9 +283,9 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    This is possible only if the byte occurs in headers. For an IMU frame, there are two further
-    cases, and one must be true: the byte is FF, or the frame's last word differs from the last word
-    of the previous IMU frame.
+    This is possible only if the byte occurs in headers. An IMU frame must also meet one of two
+    conditions: the byte is FF, or the frame's last word differs from the last word of the previous
+    IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -37,7 +37,7 @@ SPOKEN_AGAINST: Final = 3.0
 """Least cost of a frame's content at which the frame must wait. The bytes after the frame then
 decide whether it is accepted."""
 DOUBT_BYTES: Final = 170
-"""Largest number of uncertain bytes. When it is reached, the decoder decides about their first half.
+"""Largest number of uncertain bytes. When it is reached, the decoder decides on their first half.
 In nominal mode, the board sends this number of bytes in 100 ms."""
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Least number of bytes for which the fast path is tried: the length of the shortest frame."""

@@ -85,9 +85,9 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
     bench: Bench,
 ) -> None:
-    """While the e-stop is latched, commands are refused.
+    """While the e-stop is latched, commands are refused. Its release does not move the robot.
 
-    The release of the e-stop does not move the robot.
+    The robot moves only after a new command.
     """
     estop(bench, True)
     for _ in range(100):

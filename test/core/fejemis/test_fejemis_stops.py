@@ -105,8 +105,8 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 def test_a_pause_survives_a_reconnect_and_the_release_of_an_estop() -> None:
     """The e-stop is latched, the user pauses the robot, and the port of the front board is lost.
 
-    At the release of the e-stop, the driver does not send ``start``: the pause ends only with
-    ~/start.
+    When the e-stop is released, the driver does not send the line ``start`` to the boards. Only the
+    user's ~/start ends the pause.
     """
     bench = nominal()
     bench.estop(True)
@@ -187,7 +187,8 @@ def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() 
 def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None:
     """The robot is paused. The e-stop is latched before the drive board has confirmed ~/start.
 
-    The answer names the e-stop. The robot stays paused after the release, until the next ~/start.
+    So ~/start fails, and its answer names the e-stop. After the release of the e-stop, the robot
+    stays paused until the next ~/start.
     """
     bench = nominal()
     assert bench.ask(Request.PAUSE).success

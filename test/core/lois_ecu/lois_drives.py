@@ -159,7 +159,7 @@ class Drive:
 
 
 def nominal(firmware: Firmware, seed: int = 0) -> LoisSettings:
-    """Return settings of a simulated board: exact wheel sizes, and a load of 1 % duty."""
+    """Return settings of a simulated board: exact wheel sizes, a random load of 1 % duty."""
     return LoisSettings(quirks=QUIRKS[firmware], seed=seed, load_percent=1.0)
 
 
@@ -319,7 +319,7 @@ def motion(
 
 
 def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
-    """Drive a program, stop, and return the outcome.
+    """Drive the steps of ``program``, stop, and return the outcome.
 
     Each byte is lost with probability ``loss``, in either direction.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry of wheels that turn backward, which the public firmware does not count."""
+"""Odometry of wheels that turn backward. The public firmware does not count backward ticks."""
 
 import math
 from dataclasses import replace
@@ -61,10 +61,10 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """A wheel at rest is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
+    """The board keeps reporting 12 RPM for a wheel at rest. The driver commands 7 RPM backward.
 
-    A rolling wheel would slow down from 12 RPM. So the odometry detects that the wheel is at rest,
-    and adds no distance.
+    If the wheel were rolling, it would now slow down from 12 RPM. So the odometry detects that the
+    wheel was at rest, and adds no distance.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -72,10 +72,10 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 
 
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
-    """The driver reads once in 0.05 to 0.35 s, so ticks and odometry come in the same read.
+    """The driver reads once in 0.05 to 0.35 s, so one read contains reports of ticks and odometry.
 
-    Nevertheless, the driver detects each wheel that stops. Otherwise, the position would be wrong
-    by 4 m.
+    Nevertheless, the driver detects each wheel that stops. If it did not, the position would be
+    wrong by 4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m

@@ -15,7 +15,8 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 def test_a_read_that_is_late_is_told(lost: float) -> None:
     """One read is 40 ms late.
 
-    The estimate shows this delay, even if the board's clock stops while the board sends.
+    The estimated delay of this read is 40 ms. This is also true if the board's clock stops while
+    the board sends.
     """
     board = BoardTime()
     found = []
@@ -125,9 +126,9 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 
 
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
-    """Reads are up to 0.1 s late at random. A further read that is 0.1 s late is not irregular.
+    """Reads are up to 0.1 s late at random, so a further read that is 0.1 s late is not irregular.
 
-    A read that seems early is irregular, because a read cannot be early.
+    A read that seems early is always irregular, because no read can be early.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):
@@ -155,7 +156,10 @@ def nanoseconds(board_s: float) -> int:
 
 
 def settled_on_time() -> BoardTime:
-    """Return the estimator after 60 tick reports that were read in time. The clock counts ns."""
+    """Return an estimator that has processed 60 tick reports, all read in time.
+
+    The board's clock counts ns.
+    """
     board = BoardTime()
     for step in range(60):
         board.late_s(nanoseconds(0.2 * step), "ns", 0.2 * step)

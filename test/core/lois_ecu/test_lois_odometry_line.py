@@ -12,7 +12,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 def test_odometry_before_the_first_ticks_of_a_new_line_leaves_the_covariance_finite() -> None:
     """The driver reconnects, and sends a backward command before the first ticks arrive.
 
-    The last ticks are then old, but the covariance stays finite.
+    The last known ticks are then from before the reconnect. The covariance stays finite.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)

@@ -2,9 +2,9 @@
 
 """Drives of a simulated LOIS robot with few or many encoder ticks per turn.
 
-A simulated board can measure the speed of a wheel that has up to about 1000 ticks per turn. With
-more ticks, the tests command duties. The public firmware loses fast ticks, so its tests have at
-most 60 per turn.
+If a wheel has more than about 1000 ticks per turn, the simulated board cannot measure its speed.
+The tests then command duties. The public firmware loses fast ticks, so the tests of this firmware
+have at most 60 ticks per turn.
 """
 
 import math
@@ -117,9 +117,9 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """The robot drives out and back. When it is back, the board's clock wraps.
+    """The robot drives out and back. When it is back, the board's clock wraps, and a read is late.
 
-    Clock and counts are then near zero, and a read is late. But no restart is assumed.
+    Clock and counts are then near zero, as after a restart. But the driver assumes no restart.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, -2.6)

@@ -188,10 +188,11 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
-    """The user sets duty mode in a forward drive, and then drives backward.
+    """The user sets duty mode in a forward drive, then drives backward. Odometry shows this motion.
 
-    A Stop does not change the RPM target of the public firmware. While this target is positive, the
-    firmware counts all ticks as forward. So the driver clears the target before it drives by duty.
+    After a Stop, the public firmware still has the RPM target of the forward drive. While this
+    target is positive, it counts all ticks as forward. So the driver clears the target before it
+    drives by duty.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -303,8 +304,9 @@ def refusal(bench: Bench, vx: float = 0.3) -> str:
 def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: str) -> None:
     """The user sets a terminal mode during a drive, and later ends it.
 
-    The driver's reason is true at each time: while the robot is stopped, until the mode is written,
-    in the mode, and until the board has left the mode.
+    Motion is refused for three reasons, one after the other. Until the mode is written, the mode is
+    changing. After that, the board is in the mode. At the end, the board has not left the mode yet.
+    The driver gives each reason only while it is true.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -333,11 +335,11 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """A terminal mode is requested. In two situations, motion is refused because it is changing.
+    """Motion is refused in two situations because the terminal mode is still changing.
 
-    First, the robot is at rest, but the driver has to write its settings before the terminal mode.
-    Later, the mode was written, but messages of the normal mode arrive. They show that the board is
-    not in the terminal mode.
+    In the first, the robot is at rest, but the driver must write its settings before the mode. In
+    the second, the driver has written the mode, but messages of the normal mode arrive. They show
+    that the board is not in the terminal mode.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)
@@ -372,9 +374,9 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
     """The user changes the drive mode, sets a terminal mode, and takes the terminal mode back.
 
-    Each of the two modes begins only when the robot has been stopped. So the driver still stops the
-    robot before the other drive mode begins. Until then, its reason for refusals names only the
-    drive mode.
+    A new drive mode begins only when the robot has been stopped. So the driver still stops the
+    robot. Until the new drive mode begins, the reason for refusals names the drive mode, and no
+    longer the terminal mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

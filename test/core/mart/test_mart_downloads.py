@@ -116,7 +116,7 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A stop interrupts the download of the log, after the driver has sent EXIT.
+    """A zero command cancels the download of the log, after the driver has sent EXIT.
 
     EXIT ends the server. Therefore the job's result asks the user to copy the file from the
     controller.

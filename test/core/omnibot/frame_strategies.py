@@ -34,10 +34,10 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    A pose is at most 1e7, in mm or mrad.
+    The coordinates of a pose must be at most 1e7, in mm or mrad.
 
-    An acceleration word of -6 has the bytes of a header. For an IMU frame with such a word, the
-    result is True only if its acceleration is at least 0.5 g.
+    An acceleration word of -6 has the same bytes as a header. An IMU frame with such a word must
+    have an acceleration of at least 0.5 g.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7
@@ -99,7 +99,7 @@ byte_orders = st.sampled_from(["big", "little"])
 
 
 def float32(value: float) -> float:
-    """Return the nearest value of a 32-bit float."""
+    """Return ``value``, rounded to the precision of a 32-bit float."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", value))
     assert isinstance(rounded, float)
     return rounded

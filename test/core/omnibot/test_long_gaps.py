@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of odometry across gaps of more than a second, which the board's pose ends."""
+"""Tests of odometry after gaps of more than a second, with and without a pose of the board."""
 
 import pytest
 from lossy_drives import (
@@ -98,10 +98,10 @@ def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: in
 
 
 def test_a_pose_that_does_not_correct_continues_the_motion_for_two_seconds_at_most() -> None:
-    """The robot drives at 0.25 m/s, and ``use_board_pose`` is off.
+    """The robot drives at 0.25 m/s. ``use_board_pose`` is off, so poses do not correct odom.
 
-    A pose shows 600 lost deltas, which take 24 s. Odom continues the motion for only 2 s of this
-    time, that is 0.5 m.
+    A pose arrives after a gap of 600 deltas, that is 24 s. Odom continues the motion for only 2 s
+    of the gap, that is 0.5 m.
     """
     odometry = attached(OdometrySettings(use_board_pose=False))
     step = DisplacementReading(0.01, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -23,7 +23,8 @@ LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
 class Rig:
     """A simulated board and its host.
 
-    ``heard``: all reports of the board, each with the time at the end of its call of ``run``.
+    ``heard``: all reports of the board. The time of a report is the end of the call of ``run`` that
+    received it.
     """
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:

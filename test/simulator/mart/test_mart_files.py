@@ -7,7 +7,7 @@ from mart_rig import Rig
 
 
 def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
-    """Request a file with ``text``, and return its name, its size and its blocks."""
+    """Send the request ``text``; return name, size and blocks of the file in the reply."""
     before = len(rig.replies)
     rig.say(text)
     rig.run(0.1)

@@ -114,7 +114,7 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
     """The emergency stop latches. Only a reset ends it, not a command, pause or start.
 
-    Refused motion commands are not recorded.
+    The simulated board does not record the motion commands that it refuses.
     """
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))

@@ -81,7 +81,7 @@ def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
 
 @pytest.mark.slow
 def test_both_sequences_count_by_themselves_and_wrap() -> None:
-    """Deltas and poses each have their own SEQ. It counts from 0 to 255 and then wraps."""
+    """Deltas and poses each have their own SEQ. Each SEQ counts from 0 to 255 and then wraps."""
     board = SimulatedBoard(RUNNING)
     run(board, 52.0)
     assert [seq for *_, seq in deltas(board)] == [n % 256 for n in range(1300)]

@@ -30,9 +30,9 @@ STOP = "rc 2 0 0"
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """One of the two Teensys is unplugged during a drive. The driver stops the other one.
+    """One of the two Teensys is unplugged during a drive. The driver stops the other Teensy.
 
-    The driver stops the unplugged Teensy when it is plugged in again.
+    When the unplugged Teensy is plugged in again, the driver stops it, too.
     """
     said = len(driver.lines)
     assert probe.call(SetBool, "brush", data=True).success
@@ -56,10 +56,10 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_brush_that_cannot_be_switched_off_now_is_no_success(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """The front board is unplugged while the brush is on, and the user switches the brush off.
+    """The front board is unplugged while the brush is on. Then the user switches the brush off.
 
-    The service fails, and its answer names the missing port. When the board is back, the driver
-    switches the brush off.
+    This service call fails, and its answer names the missing port. When the front board is plugged
+    in again, the driver switches the brush off.
     """
     assert probe.call(SetBool, "brush", data=True).success
     robot.wait_until(lambda board: board.vehicle.brush)
@@ -176,7 +176,7 @@ def test_it_drives_without_sums(
 
 
 def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
-    """The user gives the same port twice. The driver asks for two ports and exits with code 2."""
+    """The user gives one port for both boards. The driver rejects this and exits with code 2."""
     driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
     driver.wait_for_line("'front_port' must differ from 'port', .* their own port")
     assert driver.end() == 2
