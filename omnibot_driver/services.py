@@ -30,7 +30,7 @@ from omnibot_driver.replay import Replay
 class Services:
     """The services of one node, except those that only one kind of board has.
 
-    ``calibration_file``: path of the file in which a measured gyro bias is saved. Empty: not saved.
+    ``calibration_file``: path of the file for the measured gyro bias; if empty, it is not saved.
     """
 
     def __init__(

@@ -251,7 +251,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """The driver replaces the stop bytes just before it ends. Its guard writes the new ones."""
+    """The driver replaces the stop bytes just before it ends. Its guard writes the newest ones."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):

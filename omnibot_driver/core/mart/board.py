@@ -127,7 +127,7 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that a datagram from this channel yields.
 
-        Once the mode is nominal, a reply that yields nothing else yields ANSWERED.
+        Once the mode is nominal, a reply without any other reading yields the reading ANSWERED.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)

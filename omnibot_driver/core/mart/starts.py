@@ -101,8 +101,8 @@ class Starts(FailedStarts):
         """Return the next request that switches off the motors, if it may be sent now.
 
         The requests are MCS, which writes "stop" to both motors, and MSM, which ends the effect of
-        MCS. Each waits while a late reply could be taken for its reply. MSM also waits until no
-        copy of MCS can arrive after it.
+        MCS. Neither is sent while a late reply to another request could be mistaken for its reply.
+        MSM is also not sent while a duplicate of MCS could arrive after it.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)

@@ -117,7 +117,7 @@ def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
 def test_a_late_read_is_not_blamed_on_the_drive_board() -> None:
     """The driver reads nothing for 0.3 s.
 
-    The refusal of a command names the computer, and neither board.
+    The refusal of a command names the computer as the cause. It does not name the drive board.
     """
     bench = nominal()
     bench.run(0.3)

@@ -157,9 +157,10 @@ def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
 def assert_the_estop_is_the_answer_and_the_pause_continues(
     bench: Bench, answer: RequestDone, mark: float
 ) -> None:
-    """Check the failed answer, release the e-stop, and check that only ~/start ends the pause.
+    """Check that ``answer`` is a failure because of the e-stop. Then release the e-stop.
 
-    ``mark``: a time in s. The driver must not have sent ``start`` from then until ~/start.
+    The robot must stay paused until the next ~/start. From the time ``mark`` (in s) until this
+    ~/start, the driver must not send the line ``start``.
     """
     assert not answer.success
     assert "release it with ~/estop" in answer.message
@@ -173,7 +174,8 @@ def assert_the_estop_is_the_answer_and_the_pause_continues(
 def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() -> None:
     """The robot is paused and the e-stop is latched when the user calls ~/start.
 
-    The answer names the e-stop. The robot stays paused after the release, until the next ~/start.
+    The service fails, and its answer names the e-stop. After the release of the e-stop, the robot
+    stays paused until the next ~/start.
     """
     bench = nominal()
     assert bench.ask(Request.PAUSE).success

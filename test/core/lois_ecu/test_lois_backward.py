@@ -52,8 +52,8 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again() -> None:
     """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
 
-    The odometry detects that the wheel is at rest. Otherwise, the estimated heading would be wrong
-    by 600°.
+    The odometry detects that the wheel is at rest. If it did not, the estimated heading would be
+    wrong by 600°.
     """
     one = motion(nominal("firmware", 2020), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)

@@ -69,7 +69,7 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
     """The user sets a terminal mode during a drive. In this mode, the board reports no motion.
 
     So the driver first stops the robot, and writes the mode only after the standstill is proved.
-    Therefore it does not log that the stop is unconfirmed.
+    The driver does not log that the stop is unconfirmed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, drive_s)
@@ -291,7 +291,7 @@ def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
 
 
 def refusal(bench: Bench, vx: float = 0.3) -> str:
-    """Return the driver's reason for the refusal of a motion command. Empty if it is allowed."""
+    """Return why the driver refuses a motion command; empty if it accepts the command."""
     try:
         bench.drive(vx)
     except CommandRefused as refused:
