@@ -60,11 +60,13 @@ class SharedSession:
         self.told = False
         """Whether the link wrote its last Stop to every line.
 
-        If the port is lost when the link ends, the reader opens it again and writes Stop. In this
-        case, ``told`` stays False if a standstill had been proved (``Shutdown.owed`` is False).
+        If the port is lost when the link ends, the reader opens it again and writes Stop. After
+        that, ``told`` is True only if a standstill had not been proved before (``Shutdown.owed`` is
+        True).
         """
         self.stood = False
-        """Whether Stop was sent and measurements showed the robot at rest when the link ended."""
+        """Whether, at the end of the link, Stop was sent and measurements showed the robot at
+        rest."""
         self.closing = threading.Event()
         """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write
@@ -95,16 +97,16 @@ class SharedSession:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Call ``action`` with the session and ``wish``, the motion that a sender wants.
+        """Call ``action`` with the session and ``wish``, the motion that a sender commands.
 
         * ``sent_ns``: possible times at which the command was sent, as time of day in ns. While the
           sender's clock is not known well, there are two possible times.
         * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
           the motion interlock must know that the sender is still active.
 
-        Raises CommandRefused if ``action`` refuses, or if the command was sent while this process
-        was stalled. The function ``refused`` also receives the reason; but if too many events wait
-        for delivery, it is not called.
+        Raises CommandRefused if ``action`` refuses the command, or if the command was sent while
+        this process was stalled. In both cases, the function ``refused`` gets the reason. It
+        is not called if too many events wait for delivery.
         """
         try:
             with self.lock:

@@ -148,8 +148,9 @@ def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proof
 ) -> None:
     """Displacements are rare, so a proof that the robot is at rest needs the longest possible wait.
 
-    The first proof comes at the last moment, and the second one does not come. Both waits and the
-    guard's last words together are shorter than the time limit for the driver's end.
+    The link waits for two proofs. The first proof comes at the last moment, and the second one does
+    not come. The two waits and the time for the guard's last words are together shorter than the
+    time limit for the driver's end.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S

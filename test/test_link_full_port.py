@@ -35,9 +35,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A write fails because the port is full. The board may have received half a command.
+    """A write fails because the port is full. The board may have received only a part of a command.
 
-    The link writes Stop, then its opening sequence.
+    So the link first writes Stop, then its opening sequence, before anything else.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -81,8 +81,9 @@ def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
 ) -> None:
     """The board is silent, so the link closes without a proof of rest, and the guard repeats Stop.
 
-    If the port accepted the link's last packets, they may still be in its buffer, so the guard
-    keeps them. A full port contains old commands, so the guard discards these.
+    If the port accepted the link's last packets, they may still be in the port's buffer. Then the
+    guard keeps the content of the buffer. If the port was full, the buffer contains old commands,
+    and the guard discards them.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

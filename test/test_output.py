@@ -114,7 +114,7 @@ raise SystemExit("then the last words")
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
     """Standard streams are closed, so their descriptors are free. A port gets another descriptor.
 
-    Otherwise, printed text would go to the board.
+    If it got one of the free descriptors, printed text would go to the board.
     """
     program = """
 import os, sys

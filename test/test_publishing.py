@@ -74,7 +74,7 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
 def test_a_command_waits_for_no_events_of_publishers() -> None:
     """No publisher has event handlers.
 
-    The executor would spend time on each handler, and commands would have to wait.
+    If there were handlers, the executor would spend time on each, and commands would have to wait.
     """
     script = (
         "import rclpy\n"
@@ -217,8 +217,8 @@ WITHOUT_STAMP = (
 def test_what_needs_no_stamp_does_not_wait_for_simulated_time(node: Node, value: object) -> None:
     """The simulated clock has not begun. The board's records and changes of state are passed on.
 
-    Otherwise, ~/record_rpm would answer only after 120 s, and a press of the e-stop button, which
-    the board reports once, would never be published.
+    If they waited for the clock, ~/record_rpm would answer only after 120 s. A press of the e-stop
+    button would never be published, because the board reports a press only once.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -254,7 +254,7 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     """One read contains a report of a pause, and then data.
 
     In the middle of this read, another thread publishes the state "paused". So after the read, the
-    driver publishes "nominal". Otherwise, later subscribers would get "paused".
+    driver publishes "nominal". If it did not, later subscribers would get "paused".
     """
     session, publishing = session_with(node)
     published: list[str] = []

@@ -65,8 +65,8 @@ def test_a_sender_of_refused_commands_does_not_pause(
 ) -> None:
     """The motion monitor has stopped the robot. Then only invalid or late commands are sent.
 
-    The robot may move again only after the sender has been silent. Invalid and late commands show
-    that the sender is not silent, so its next valid command is refused, too.
+    The robot may move again only after its sender was silent for a time. A sender of invalid or
+    late commands is not silent. So the driver also refuses the next valid command.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -2,8 +2,8 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
-The board stores some of these values. Such a parameter is unset by default, and the driver then
-writes no value to the board.
+The board itself stores the values of some parameters. These parameters are unset by default. While
+such a parameter is unset, the driver does not write a value to the board.
 """
 
 from collections.abc import Mapping

@@ -51,10 +51,11 @@ class Inbound:
         self.process(now)
 
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
-        """Decode bytes, and return the estimates to publish at once. Call ``process`` afterwards.
+        """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        If these bytes change the mode, the estimates become events, and the result is empty.
-        ``hear`` then calls ``process`` itself, before any command is handled.
+        If these bytes change the mode, the result is empty. ``hear`` then adds the estimates to the
+        events that the reporter holds, and calls ``process`` itself. So the change of mode takes
+        effect before any command is handled.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -75,7 +76,7 @@ class Inbound:
     def process(self, now: float) -> bool:
         """Handle the readings of the last ``hear``.
 
-        Return True if the caller must look for packets to write and events to report.
+        Return whether there may be packets to write or events to report.
         """
         last, self._last = self._last, None
         if (

@@ -63,9 +63,11 @@ class Transport(Protocol):
         """
 
     def write(self, packets: Packets) -> None:
-        """Write all packets. Data that a missing line does not accept at once are discarded.
+        """Write all packets.
 
-        Raises LinkError if the connection is lost. Its unsent bytes are then discarded.
+        One of several lines may be missing. The bytes that this line does not accept at once are
+        discarded. Raises LinkError if the connection is lost. The bytes that are not sent yet are
+        then discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -15,13 +15,14 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Commanded speeds in m/s. After the two zeros at the end, the robot can be started again."""
+"""Commanded speeds in m/s. The robot comes to rest during the two zeros at the end. After them,
+the list begins again."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Publish each speed to all robots, and record the first publication of the speed."""
+    """Publish each speed to all robots, and record when each robot gets the speed first."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

@@ -31,7 +31,7 @@ class Figure:
 
     @property
     def ratio(self) -> float:
-        """Return the median of the ratios of driver to floor."""
+        """Return the median ratio of the driver's value to the floor's value."""
         return median(self._ratios)
 
     @property

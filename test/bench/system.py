@@ -33,7 +33,7 @@ COMMANDS_S = 3.0
 SETTLING_S = 8.0
 """Time in s for which the programs run before the measurement.
 
-No event reports that they are ready.
+The time is fixed, because no event reports that the programs are ready.
 """
 GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "pieces of 1 to 16 bytes": (1.0, 1.0, 1.0, 1.0),
@@ -44,7 +44,7 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
 """Largest allowed ratios, for each adapter: value of the driver divided by value of the floor.
 
 The four ratios are: median latency, 99th percentile of the latency, processor time, and latency of
-cmd_vel. None: unlimited.
+cmd_vel. None means that a ratio has no limit.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -279,7 +279,7 @@ def latencies(
 def command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return the time from each command to the board's first read with its frame, in µs."""
+    """Return, for each command, the time in µs until the board reads the frame of this command."""
     found = []
     frames = [
         (at, struct.unpack_from(">h", data, begin + 3)[0])

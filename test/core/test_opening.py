@@ -105,7 +105,8 @@ def test_a_silent_board_is_told_once() -> None:
 def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: bytes) -> None:
     """Three IMU frames arrive, which do not show the mode. Then the board is silent for 8 s.
 
-    In this time, a part of a frame may arrive. All later stamps are recent.
+    During the silence, a part of a frame may arrive. When the board sends again, all stamps are
+    recent.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()
@@ -129,8 +130,8 @@ def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: b
 def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: Frame) -> None:
     """The last byte of a frame may begin another frame, so the decoder holds the frame.
 
-    Then the board falls silent before its mode is known. When new data come, the driver does not
-    publish the held frame with them.
+    Then the board falls silent before its mode is known. When new data come, the driver publishes
+    these data, but not the held frame.
     """
     bench, rest = Bench(), encode(REST)
     bench.open()
@@ -147,7 +148,11 @@ def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: 
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """The board restarts during a drive because of a brown-out. The command is not sent again."""
+    """The board restarts during a drive because of a brown-out.
+
+    The driver starts the board again, but does not repeat the command. So the robot stays at rest
+    until the next command.
+    """
     bench.drive(0.5)
     bench.run(0.2)
     bench.board.reboot()

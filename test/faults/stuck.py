@@ -22,7 +22,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
     ``seconds``: time for which commands continue. The adapter holds the data for 1 s longer.
 
-    ``mute``: whether the board's data is cut while the adapter holds the driver's data.
+    ``mute``: whether the driver receives no data from the board during this time.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -38,7 +38,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 def full(rig: Rig, *, mute: bool = False) -> None:
     """Fill the port with old commands. When the port accepts data again, the robot must stop.
 
-    ``mute``: whether the board's data is cut while the port is full.
+    ``mute``: whether the driver receives no data from the board while the port is full.
     """
     rig.drive()
     mark = len(rig.driver.lines)

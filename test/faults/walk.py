@@ -21,8 +21,8 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-The time is longer than the command timeout, because a driver that has received no data must first
-detect that the robot moves.
+It is longer than the command timeout. A driver that was without data does not know whether the
+robot moves: it must first receive measurements.
 """
 
 

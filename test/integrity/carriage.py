@@ -12,7 +12,7 @@ from random import Random
 from truth import BYTE_S, Truth
 
 Origins = list[int]
-"""For each byte that arrives: its position in the true stream, or -1 if it was never sent."""
+"""For each byte that arrives: its position in the stream that was sent, or -1 for an added byte."""
 Fault = Callable[[int, Random], Origins]
 
 
@@ -75,7 +75,10 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(slots=True)
 class Received:
-    """The bytes that have arrived, their times of arrival in s, and the true stream."""
+    """The bytes that have arrived, their times of arrival in s, and the true stream.
+
+    ``truth``: the true stream, which was sent.
+    """
 
     data: bytes
     times_s: list[float]
@@ -119,7 +122,7 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 def few_bytes(received: Received, random: Random) -> Chunks:
     """Deliver pieces of 1 to 8 bytes. The line may be idle between two bytes of a piece.
 
-    Adapters keep no byte for more than 16 ms.
+    But all bytes of a piece come within 16 ms, because adapters keep no byte for longer.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):

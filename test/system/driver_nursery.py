@@ -2,7 +2,8 @@
 
 """A nursery for driver processes: one process imports the driver and forks each driver process.
 
-Imports take most of a start. Tests of the start itself run a new interpreter.
+A forked driver starts fast, because imports take most of a normal start. Tests of the start itself
+do not fork: they run a new interpreter.
 """
 
 import atexit

@@ -52,7 +52,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def hang(driver: Driver, board: PtyBoard) -> int:
-    """Suspend the driver. Return how many bytes the board has received from it until then."""
+    """Suspend the driver. Return how many bytes the board has received before the suspension."""
     driver.process.send_signal(signal.SIGSTOP)
     stat = Path(f"/proc/{driver.process.pid}/stat")
     wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T")
@@ -75,8 +75,8 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
 ) -> None:
     """The driver dies while the robot drives.
 
-    The guard process sends the stop bytes, but no emergency stop. A segmentation fault is in
-    test/faults/test_endings.py.
+    The guard process sends the stop bytes, but no emergency stop. test/faults/test_endings.py tests
+    a death by a segmentation fault.
     """
     driving(probe, board)
     assert driver.end(number) == -number
@@ -272,7 +272,7 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
 def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
     """The user presses ctrl-C while the robot drives.
 
-    The driver stops it without an emergency stop.
+    The driver itself stops the robot. It sends no emergency stop.
     """
     driving(probe, board)
     assert driver.end(signal.SIGINT) == 0

@@ -52,9 +52,10 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
-    """Press the key w until the robot drives and the test has received the command.
+    """Press the key w until the robot drives and the test has received a motion command.
 
-    One press may have no effect, because of a stall or an undiscovered subscription.
+    One press may have no effect: the driver may stall, or the subscription may not be discovered
+    yet.
     """
     for _ in range(20):
         said.clear()
@@ -142,7 +143,7 @@ def test_who_lets_go_of_the_key_stops_the_robot(
 ) -> None:
     """The user presses a key once. The monitor sends motion commands, then some zero commands.
 
-    It sends another zero command when it ends.
+    So the robot stops. When the user ends the monitor, it sends one more zero command.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

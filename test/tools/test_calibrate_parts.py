@@ -144,9 +144,9 @@ def test_an_empty_log_has_empty_columns() -> None:
 
 
 def test_wheels_are_as_many_as_the_robot_has() -> None:
-    """A wheel row of the log has the angles of all wheels, then their rates.
+    """A wheel row of the log has the time, then the angles of all wheels, then their rates.
 
-    The log separates the angles from the rates.
+    ``wheels`` separates the angles from the rates. In this test, the robot has two wheels.
     """
     log = Log(wheel_rows=[(0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 5.0, 6.0, 7.0, 8.0)])
     assert log.wheels.angle_rad.tolist() == [[1.0, 2.0], [5.0, 6.0]]

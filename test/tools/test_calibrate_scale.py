@@ -24,9 +24,10 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """Return the log of a drive whose commands are planned with assumed scales.
+    """Return the log of a drive, with commands that are planned for the scales ``ASSUMED``.
 
-    ``true``: the board's scales. ``gyro``: a factor on the measured rate.
+    ``true``: the scales that the board really has. ``gyro``: factor on the yaw rate that the gyro
+    measures.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -57,9 +58,10 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """Whatever the scales of the board, the tool finds them within five claimed sigmas.
+    """Whatever the scales of the board, the tool finds them.
 
-    It finds the scale of turns by the odometry and also by the gyro.
+    The error is at most five times the standard deviation that the tool claims. The tool finds the
+    scale of turns by the odometry and also by the gyro.
     """
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
@@ -78,7 +80,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 ) -> None:
     """Each planned command is a whole number of the board's counts, and at most the speed ``top``.
 
-    Only if a single count is faster than ``top``, a command of one count exceeds ``top``.
+    There is one exception: if one count is already faster than ``top``, the command is one count.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -87,9 +89,10 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """While the tool measures a speed, commands are missing. The driver may have stopped the robot.
+    """While the tool measures a speed, commands are missing from the log for a time.
 
-    So the tool does not use its measurement of this speed.
+    The driver's command timeout may have stopped the robot. So the tool does not use its
+    measurement of this speed.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))

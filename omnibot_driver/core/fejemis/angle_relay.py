@@ -24,9 +24,9 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit in degrees for a wrong angle that the board may read from a damaged line.
 
-If damage removes the minus sign, and the checksum does not detect this, an angle to the right
-becomes an angle to the left. The driver avoids texts from which the board may read such an angle of
-this size or more.
+If damage removes the minus sign, and the checksum does not detect this, the board reads an angle to
+the right as an angle to the left. The driver chooses the text of an angle so that a wrong angle of
+this kind is smaller than ``ACROSS``.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -49,9 +49,10 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield each number that a board may read after an undetected loss of two characters.
+    """Yield each number that a board may read if it loses two characters of ``text`` unnoticed.
 
-    If the remaining text is not a number, yield 0.
+    The checksum does not detect the loss of some pairs of characters. If the characters that remain
+    are not a number, yield 0.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:

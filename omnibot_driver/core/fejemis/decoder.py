@@ -41,8 +41,9 @@ class FejemisDecoder:
 
     ``changed``: whether ``sums`` has changed. The caller resets this flag.
 
-    ``doubtful``: True if ``sums`` was learnt from heartbeats, but the last line of another kind
-    contradicts it. While this is True, the driver's lines to the board carry no checksum.
+    ``doubtful``: True if the heartbeats have checksums but the last other line had none, or the
+    reverse. The user's setting must be auto. While ``doubtful`` is True, the driver's lines to the
+    board carry no checksum.
 
     ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.
     """

@@ -105,8 +105,9 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always accepted. Later, an angle is rejected if it is too far from the
-        last accepted angle. The next angle is accepted if it is near the rejected one.
+        The first angle is always accepted. A later angle is accepted if it is near the last
+        accepted angle. It is also accepted if the angle directly before it was rejected and is near
+        it.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

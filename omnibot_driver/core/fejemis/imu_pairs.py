@@ -24,14 +24,14 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""Shortest time in s between the two lines of a pair at which the pair may be false. Such a pair
-must wait for the next pose."""
+"""Time in s between the two lines of a pair. If the second line comes as late as this or later,
+the pair may be false, so it must wait for the next pose."""
 SILENT_S: Final = 0.1
-"""Length in s of a silence after which a new pair must wait for the next pose. This is so even if
-the two lines of the pair come close together.
+"""Length in s of a silence after which a new pair must wait for the next pose.
 
-The pose shows whether the board was silent, or whether the host only read late. If the board was
-silent, the sampling time of the pair is unknown, so the pair is rejected.
+The pair must wait even if its two lines come close together. The next pose shows whether the board
+was silent, or whether the host only read late. If the board was silent, the sampling time of the
+pair is unknown, so the pair is rejected.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver in which every pair must wait for the next pose. During the
@@ -39,12 +39,12 @@ stall, the kernel's buffer may have overflowed. Lines are then lost, although th
 silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits, in s, of the difference between two sums. The first sum is that of the intervals before
-gyro lines, the second that of the intervals before acceleration lines.
+"""Limits, in s, of a difference that shows which line of a sample comes first.
 
-Each interval begins at the previous line of the other kind. The interval between two samples is
-longer than the interval within a sample. So the sign of the difference shows which line of a sample
-comes first.
+The difference is the sum of the intervals before gyro lines, minus the sum of the intervals before
+acceleration lines. Each interval begins at the previous line of the other kind. The interval
+between two samples is longer than the interval within a sample. So if the difference is positive,
+the gyro line comes first, otherwise the acceleration line.
 
 ``KNOWN_S``: smallest magnitude of the difference at which its sign is used. ``SUREST_S``: largest
 magnitude that is stored.
@@ -53,12 +53,13 @@ MARKED_S: Final = PERIOD_S
 """Time in s that is added to an interval between a gyro and an acceleration line if a line of
 another kind arrives in this interval. Such an interval is probably between two samples."""
 PATIENCE: Final = 60
-"""Number of intervals after which the order of a sample's two lines is decided in any case. The
-difference of the two sums may then be below ``KNOWN_S``. It stays that small if the two lines are
-half a period apart."""
+"""Number of intervals after which the driver decides which line of a sample comes first, even if
+the magnitude of the difference is still below ``KNOWN_S``. The difference stays that small if
+the two lines are half a period apart."""
 MOST: Final = 10
-"""Largest magnitude of a counter. The counter shows whether lines of one other kind usually come
-between pairs (positive) or within pairs (negative). Each of these kinds has its own counter."""
+"""Largest magnitude of a counter. Each kind of line has a counter, except gyro and acceleration
+lines. A positive counter shows that lines of this kind usually come between two pairs. A
+negative counter shows that they usually come between the two lines of a pair."""
 UNPOSED: Final = 20
 """Largest number of gyro lines, or of acceleration lines, that may arrive after the last pose while
 a pair waits for the next pose. If more arrive, the pair is rejected."""
@@ -68,16 +69,17 @@ a pair waits for the next pose. If more arrive, the pair is rejected."""
 class Pair:
     """A gyro and an acceleration line, probably of one sample.
 
-    ``at``: arrival of the second line.
+    ``at``: time in s at which the second line arrived.
 
     ``pose_s``: the board's time of the last pose before the pair.
 
     ``skipped``: how many incomplete samples were left out since the previous pair.
 
-    ``doubtful``: whether the pair may be false, or follows a silence, and so must wait for the next
-    pose.
+    ``doubtful``: whether the pair must wait for the next pose, because it may be false or follows a
+    silence.
 
-    ``next_pose_s``: the board's time of the next pose, if it arrived before the pair was taken.
+    ``next_pose_s``: the board's time of the next pose, if this pose arrived before ``take``
+    returned the pair.
     """
 
     gyro: Gyro
@@ -145,8 +147,9 @@ class ImuPairs:
 
         ``kind``: the keyword of the line.
 
-        If a pair is incomplete at this moment, its second line is regarded as lost. There is one
-        exception: lines of this ``kind`` usually come within pairs.
+        If the second line of a pair has not come yet, it is regarded as lost. There is one
+        exception: if lines of this ``kind`` usually come between the two lines of a pair, the pair
+        continues to wait.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:

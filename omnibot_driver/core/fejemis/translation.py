@@ -40,7 +40,8 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Largest age, in s, of an IMU sample with which the driver publishes a later orientation."""
+"""Age of the last IMU sample, in s, from which on an orientation is not published. The driver
+publishes each orientation together with the last IMU sample."""
 
 
 class Translation:
@@ -199,5 +200,8 @@ def quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
 
 
 def _seen(distance_m: float) -> float:
-    """Return the distance in m; infinity for 0 or a negative number, which reports no distance."""
+    """Return a measured distance in m, or infinity if the sensor has measured none.
+
+    A sensor that has measured no distance reports 0 or a negative number.
+    """
     return distance_m if distance_m > 0.0 else math.inf

@@ -41,11 +41,11 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
-"""Time in s after which a reset is repeated. After this time, stopped wheels are at rest, and four
-tick reports have arrived.
+"""Time in s after which a reset is repeated.
 
-The driver gives the reset up less than ``UNPROVED_S`` after the last repetition. So after the last
-repetition, it does not accept small counts that never change.
+In this time, stopped wheels come to rest, and four tick reports arrive. After the last repetition,
+the driver waits for less than ``UNPROVED_S``, and then gives the reset up. So after the last
+repetition, counts near zero are not accepted without a proof of the reset.
 """
 STEADY_S: Final = 0.3
 """Time in s without a change of the tick counts, after which the wheels are regarded as at rest.
@@ -340,8 +340,8 @@ class LoisEcuBoard(Board):
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record. A later reading contains the record, or the reason for a failure.
 
-        Raises RequestRefused if the board cannot complete the record. Also raises RequestRefused
-        while a terminal mode, or a change of mode, forbids records.
+        Raises RequestRefused if the board cannot complete the record, or if it is in a terminal
+        mode or changes its mode.
         """
         self._ecu.record(kind, samples)
 

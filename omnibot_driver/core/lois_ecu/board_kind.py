@@ -17,21 +17,22 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Least number of tick reports before the kind of the board is decided.
+"""Least number of tick reports before a board is recognised as one that works as in the manual.
 
-If no odometry with the command byte of ticks (0x12) has arrived by then, and odometry with its own
-command byte (0x20) arrives, the board works as in the manual.
+The board is recognised when an odometry report with its own command byte (0x20) arrives. This is
+only possible if no odometry report with the command byte of a tick report (0x12) has arrived
+before.
 """
 UNCOUNTED_M: Final = 0.06
-"""Distance in m, summed over both wheels, that the wheels must roll backward before the board is
-judged. If neither count has fallen by then, the board does not count ticks backward."""
+"""Distance in m, summed over both wheels, for which the wheels must roll backward. If neither
+count has fallen by then, the driver decides that the board does not count ticks backward."""
 
 
 class BoardKind:
     """Kind of the board. It selects how the motion filter ``motion`` models the board.
 
-    ``appends``: whether an odometry report with the command byte of ticks follows each tick report,
-    as in the public firmware.
+    ``appends``: whether the board sends an odometry report after each tick report, with the same
+    command byte (0x12), as the public firmware does.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -65,10 +66,11 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        This is so if a wheel is commanded backward, and the board's odometry shows that the wheel
-        rolls backward, but no count decreases.
+        It does if no count decreases, although a wheel is commanded backward and the board's
+        odometry shows that this wheel rolls backward.
 
-        ``told``: changes in the board's odometry since its last report, None if unknown.
+        ``told``: changes in the board's odometry since the previous odometry report, None if
+        unknown.
         """
         if told is None or not self._motion.signed or self._seen_signed:
             return

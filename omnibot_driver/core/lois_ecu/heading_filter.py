@@ -12,9 +12,9 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Part of the turn that increases the largest accepted difference between a heading and the
-expected heading. This difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn``: change
-of the odometry's yaw since the last heading, in degrees."""
+"""Factor by which a turn increases the largest accepted difference between a heading and the
+expected heading. This difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn``:
+change of the odometry's yaw since the last heading, in degrees."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)

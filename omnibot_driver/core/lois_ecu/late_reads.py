@@ -18,8 +18,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Time in s. If no report arrives for this time, and then several tick reports arrive together,
-their times are corrected. ``BoardTime`` handles shorter delays."""
+"""Length in s of a time without reports. If several tick reports arrive together after a longer
+time without reports, their times are corrected. ``BoardTime`` handles shorter delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
 """Factor by which the computed time between two reports is increased. The rate of the board's clock
@@ -52,7 +52,8 @@ class LateReads:
         self._unit: ClockUnit | None = None
         self._arrived_s = self._latest_s = -math.inf
         self._rates: deque[float] = deque(maxlen=RATES_KEPT)
-        """Durations of one unit of the board's clock, in s, as the last tick reports show them."""
+        """The last measured durations of one unit of the board's clock, in s. Tick reports show
+        them."""
 
     def times(
         self, reports: list[Report], arrived: list[float], unit: ClockUnit | None

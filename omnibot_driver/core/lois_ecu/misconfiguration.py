@@ -27,7 +27,7 @@ OWN_GAINS: Final = (
     " `calibrate step`, or set these parameters"
 )
 """Advice if the user has not set all gains. The braces are replaced by the names of the missing
-gains. The numbers are from 150 forward drives with the compiled firmware."""
+gains. The errors of the odometry were measured in 150 forward drives with the compiled firmware."""
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
     "the tick counts change faster than a wheel can turn, so the driver rejects the tick reports,"
@@ -35,8 +35,8 @@ TOO_FAST_ADVICE: Final = (
 )
 """Advice after ``TOO_FAST`` rejected tick reports in a row."""
 LOOK_AT: Final = 600
-"""Number of bytes without a valid line before advice is given. The board sends at least 70 bytes
-per second."""
+"""Number of bytes without a valid line after which advice is given. The board sends at least 70
+bytes per second, so the advice comes within 9 s."""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
 _NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")

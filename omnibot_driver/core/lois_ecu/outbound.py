@@ -28,8 +28,9 @@ MOST_PERCENT: Final = 100
 # After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""Number of times that RPM 0/0 is sent after a Stop. It is sent directly before each of the next
-set-points, or alone while no set-point follows. Once would be enough, but lines may be lost."""
+"""How often RPM 0/0 is sent after a Stop. If the robot drives again, RPM 0/0 is sent directly
+before each of the first set-points. While the robot stays stopped, RPM 0/0 is sent alone. Once
+would be enough, but lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

@@ -46,19 +46,20 @@ RESTARTED_TURNS_PER_S: Final = 1.0
 RESTARTED_TURNS_PER_S * duration`` turns, and ``RESTARTED_TICKS`` ticks more. If a count falls
 further, the board has restarted."""
 SILENT_S: Final = 1.0
-"""Longest time in s without tick reports for which rolled-back wheels can explain the counts.
+"""Longest time in s without tick reports for which rolling wheels can explain small counts.
 
-If counts are near zero and the clock is irregular, the board may have restarted, or the wheels may
-have rolled back to these counts. After a longer silence, the driver then assumes a restart.
+If the counts are near zero and the clock is irregular, there are two explanations: the board has
+restarted, or the wheels have rolled back. If no tick report came for a longer time, the driver
+assumes a restart.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Limit, in s, of the time since the last tick report, for the detection of a restart.
+"""Longest time, in s, for which the wheels may have rolled back, if the time is unconfirmed.
 
-The detection uses this time to compute how far the wheels may have rolled back. The limit applies
-only if the unit of the board's clock has just become unknown, because the clock then cannot confirm
-the time.
+To detect a restart, the driver computes how far the wheels may have rolled back since the last tick
+report. Usually it uses the whole time since that report. If the unit of the board's clock has just
+become unknown, the clock cannot confirm this time, so the driver uses at most this limit.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s after a reset for which counts may still be from before the reset.
@@ -115,7 +116,10 @@ class Translation:
         self._reset_until_s = None
 
     def reset(self) -> None:
-        """Begin new counts, because a reset is sent. Counts from before it may still arrive."""
+        """Begin new counts, because a reset is sent.
+
+        Counts from before the reset may still arrive.
+        """
         self._begin_counts()
         self._reset_until_s = math.inf
 
@@ -242,8 +246,8 @@ class Translation:
         """Return how long ago the board's clock began at zero, in s. None if unknown.
 
         The clock begins at zero when the board starts. A clock in ns also begins at zero every
-        4.3 s. Its age is known only if it began at zero after the last tick report, and this report
-        is less than 4.3 s old.
+        4.3 s. So the result for a clock in ns is known only if the clock began at zero after the
+        last tick report, and this report is less than 4.3 s old.
 
         ``duration_s``: time in s since the last tick report.
         """
@@ -255,13 +259,13 @@ class Translation:
         return None if wrapped_too else age_s
 
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
-        """Return whether the board has restarted.
+        """Return whether the clock and the counts prove a restart of the board.
 
-        Called if the counts and the clock may have begun at zero again. A clock in ns begins at
-        zero every 4.3 s, so a small clock value alone proves nothing. The board has restarted if
-        the clock does not fit the last reports, and rolling wheels do not explain the counts. After
-        ``SILENT_S`` without ticks, the clock alone decides. If the result is False, an error is
-        added to the odometry, because a restart is still possible.
+        Called if the counts and the clock may have begun at zero again. A small clock value alone
+        proves nothing, because a clock in ns begins at zero every 4.3 s. A restart is proved if the
+        clock does not fit the last reports, and rolling wheels do not explain the counts. If no
+        ticks came for more than ``SILENT_S``, the clock alone decides. Without a proof, a restart
+        is still possible, so an error is added to the odometry.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)

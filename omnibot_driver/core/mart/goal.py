@@ -39,10 +39,10 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""How much each turn since the last straight move increases the allowed heading error.
+"""Increase of the allowed heading error for each turn since the last straight move.
 
-It is a fraction of the initial allowed error. Without the increase, the robot could turn back and
-forth, because turns overshoot.
+It is a fraction of the initial allowed error. Turns overshoot, so without this increase the robot
+could turn back and forth.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
@@ -137,10 +137,10 @@ class Move:
         self.given_up = self.failed = True
 
     def repeated(self) -> "Move":
-        """Return the progress to continue with when ``place`` is commanded again.
+        """Return the ``Move`` to continue with when ``place`` is commanded again.
 
-        A failed goal begins anew. If the robot has reached the goal, it makes another straight move
-        only if it is now more than ENOUGH_M (m) away from the goal.
+        A goal in progress continues. A failed goal begins anew. If the robot has reached the goal,
+        it makes another straight move only if it is now more than ENOUGH_M (m) away from the goal.
         """
         if not self.given_up:
             return self
@@ -149,9 +149,10 @@ class Move:
         return Move(self.place, said=ENOUGH_MOVES, turns=self.turns)
 
     def cut(self) -> None:
-        """Count moves and turns from 0 again. A straight move took too long and was stopped.
+        """Count moves and turns from 0 again, because a straight move took too long.
 
-        This is not a failure: the server needs more than one straight move to a goal far away.
+        The driver has stopped this move. The move has not failed: the server needs more than one
+        straight move to a goal far away.
         """
         self.said = self.turns = 0
 

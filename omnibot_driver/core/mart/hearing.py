@@ -19,10 +19,11 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units after which the driver may continue without a reply.
+"""Largest relative change of the motors' units that is accepted without a reply from the server.
 
-The limit applies to a backward drive (B) whose headings the server does not report. If the server
-does not answer a larger change, the turn of the robot is not known, so the driver stops the robot.
+The limit applies to a backward drive (B) in which the server reports no headings. If the server
+does not answer a larger change, the driver does not know how the robot turns. So it stops the
+robot.
 """
 
 
@@ -66,9 +67,10 @@ class Hearing(Measuring):
             self._answered(answer, now)
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
+        """Return whether a reply after a stop command may be late: an older answer, or a copy.
 
-        For example, it may be the ``ok`` to the start, or an encoder count.
+        An older answer belongs to an earlier request. For example, it is the ``ok`` to the start of
+        the motion, or an encoder count.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:

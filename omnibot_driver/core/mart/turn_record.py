@@ -13,8 +13,8 @@ from typing import Final
 from omnibot_driver.core.mart.words import Request
 
 SAME_DEG: Final = 0.5
-"""Largest accepted difference, in degrees, between the angle of the turn's command and the
-requested angle that the file of the turn contains."""
+"""Largest accepted difference, in degrees, between two values of a turn's requested angle: the
+value in the turn's command, and the value in the file that records the turn."""
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
 """Limits of the sum of all angles that were read from records, in rad.
 
@@ -34,7 +34,7 @@ _HEAD: Final = re.compile(
 
 
 class TurnRecords:
-    """The records of controlled turns: whether another one is needed, and what they have shown."""
+    """The records of controlled turns, and the ratio of the motors' speeds that they have shown."""
 
     def __init__(self) -> None:
         self._downloads = 0
@@ -46,7 +46,7 @@ class TurnRecords:
         self._failures, self._name = 0, ""
 
     def forget(self) -> None:
-        """Forget the ratio of the motors' speeds, because the sizes of the robot have changed."""
+        """Forget the ratio of the motors' speeds, because parameters of the robot have changed."""
         self._told_rad = self._wheel_rad = 0.0
 
     @property
@@ -59,14 +59,15 @@ class TurnRecords:
     def balance(self) -> float | None:
         """The speed of the left motor divided by the speed of the right motor, in controlled turns.
 
-        None until the records have shown this ratio.
+        None until the recorded turns add up to LEAST_RAD.
         """
         return self._told_rad / self._wheel_rad - 1.0 if self._told_rad >= LEAST_RAD else None
 
     def asked(self) -> None:
         """Record that a download begins.
 
-        It is regarded as a failure until ``used`` reports that the odometry has used the record.
+        The download is regarded as a failure until ``used`` reports that the odometry has used the
+        record.
         """
         self._downloads += 1
         self._failures += 1

@@ -35,11 +35,11 @@ CALMING: Final = 0.95
 """Factor by which the stored largest recent change shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Largest fraction of an IMU spike that remains in the next reading. If more than this fraction of
+"""Largest fraction of a spike that remains in the next IMU reading. If more than this fraction of
 an implausible change remains, the change was not a spike.
 
-The fraction has a second use. If all other values of the reading change by at most this fraction of
-the largest change, only the value with the largest change is regarded as changed.
+The fraction has a second use: it shows whether only one value of a reading has changed. This is
+so if all other values change by at most this fraction of the largest change.
 """
 END_OF_SCALE: Final = 0.99996
 """Fraction of the accelerometer's full scale from which on a reading is regarded as at the end of
@@ -48,11 +48,11 @@ MOST_HELD: Final = 10
 """Largest number of readings that are held: a displacement that changed implausibly much, and the
 poses after it."""
 ALIKE: Final = 2.0
-"""Largest ratio of the durations of two displacements that the filter compares. The size of an
-implausible change depends on the duration."""
+"""Largest ratio between the durations of two successive displacements. If the ratio is larger,
+the filter does not compare the two, because even a steady motion would then seem to change."""
 BACK: Final = 0.25
-"""Largest fraction of a displacement's spike that remains in the next displacement. If more than
-this fraction of an implausible change remains, the change was not a spike."""
+"""Largest fraction of a spike that remains in the next displacement. If more than this fraction
+of an implausible change remains, the change was not a spike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ class OutlierFilter:
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. If so, the filter does not reject
       an impossible but finite displacement. It passes the displacement on with ``measured`` False.
-      ``possible`` is False too, unless ``duration_s`` is None or 0.
+      If the duration of the displacement is known and not 0, ``possible`` is False, too.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -101,7 +101,7 @@ class OutlierFilter:
         self._imu_leaps = _Spikes(STILL, knocked=3)
         self._motion_leaps = _Spikes(BACK, knocked=0)
         self._lasted_s = 0.0
-        """Duration of the last displacement that had one, in s."""
+        """Duration in s of the last displacement whose duration was known and not 0."""
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
         """A displacement that changed implausibly much, and the poses after it."""
@@ -110,9 +110,9 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Add a reading; return the readings whose wait is over. Each kind stays in order.
+        """Add a reading; return the readings that need not wait any longer.
 
-        A reading that need not wait is returned at once.
+        A reading that need not wait is returned at once. Readings of the same kind stay in order.
         """
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
@@ -215,7 +215,7 @@ class OutlierFilter:
     def _told_of_losses(self, reading: Reading) -> Reading:
         """Return the reading; in a pose, ``lost`` also counts the rejected displacements.
 
-        The pose includes the motion of the rejected displacements, so they are not needed.
+        The pose includes the motion of these displacements, so their motion is not lost.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -298,10 +298,10 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether one flipped bit can explain the step of a value.
 
-        The step may differ from the bit by the recent variation of the readings.
+        The value of the bit may differ from the step by the recent variation of the readings.
 
-        ``value``: magnitude after the step. If this is at the end of the scale, the result is
-        False, because a knock can cause such a value.
+        ``value``: magnitude after the step. If the magnitude is at the end of the scale, the result
+        is False, because a knock against the robot can cause such a value, too.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -22,7 +22,8 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s after a command to stand still in which the robot still counts as driven."""
+"""Time in s that a robot may need to stop after a command to stand still. During this time, its
+motion is not regarded as motion without a command."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -128,7 +129,8 @@ class MotionMonitor:
         """Record that the driver's e-stop was released.
 
         The board has an e-stop of its own, which may still hold the robot. So until the robot moves
-        as commanded, the fault of a robot at rest is HELD_BY_ESTOP instead of BLOCKED.
+        as commanded, a robot that does not obey a motion command has the fault HELD_BY_ESTOP, not
+        BLOCKED.
         """
         self._released = True
 
@@ -154,9 +156,9 @@ class MotionMonitor:
     def count_impossible(self, now: float) -> Fault | None:
         """Return the fault that four impossible displacements in a row show, or None.
 
-        The outlier filter passes some impossible displacements on, because the board may have
-        corrected its own odometry. Call this method for such a displacement, instead of ``check``.
-        A single one is regarded as a correction.
+        If the board may have corrected its own odometry, the outlier filter does not reject an
+        impossible displacement. Call this method for such a displacement, instead of ``check``.
+        Fewer than four in a row are regarded as corrections of the board's odometry.
         """
         self._error.reset()
         self._impossible += 1
@@ -166,7 +168,7 @@ class MotionMonitor:
         return self._exceed(now)
 
     def disregard_refused(self, count: int) -> None:
-        """Record how many displacements were rejected so far, and do not look for a fault.
+        """Record how many displacements were rejected so far, without looking for a fault.
 
         This method is called while the robot is not monitored.
         """
@@ -222,12 +224,12 @@ class MotionMonitor:
         return fault
 
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
-        """Return the fault of a robot that moves outside its envelope.
+        """Return the fault of a robot whose motion does not fit its commands.
 
-        A linear velocity counts as too fast if it is within 60° of a set-point's direction. A yaw
-        rate counts as too fast if it has the same sign as a set-point's yaw rate. Otherwise the
-        fault is a wrong direction. If the heading is not known, a linear velocity always counts as
-        too fast.
+        Such a robot is either too fast, or moves in the wrong direction. A linear velocity is
+        regarded as too fast if it is within 60° of a set-point's direction, or if the heading is
+        not known. A yaw rate is regarded as too fast if it has the same sign as a set-point's yaw
+        rate.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -242,9 +244,9 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
-        While a robot is being pushed, Stop is sent at ever longer intervals.
-
-        ``begins``: whether the following error exceeds its limit. Only then is the first Stop due.
+        ``begins``: whether the following error exceeds its limit. The first Stop is due when this
+        is True. If the robot continues to move, for example because somebody pushes it, Stop is due
+        again after ever longer times.
         """
         if not self._error.outside:
             self._stood_s += seconds

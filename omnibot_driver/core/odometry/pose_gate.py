@@ -19,8 +19,8 @@ BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
 with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
 
-The possible motion of lost displacements is added to these limits, unless a pose has shown that
-motion already.
+The limits are larger after displacements were lost: the possible motion of these displacements
+is added until a pose has shown their motion.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -50,7 +50,10 @@ class PoseGate:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Move the unconfirmed pose ``doubted`` by an assumed motion, given in that pose's axes."""
+        """Move the unconfirmed pose ``doubted`` by the motion that is assumed for a gap.
+
+        ``chord``: this motion, in the axes of ``doubted``.
+        """
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
 
@@ -67,11 +70,11 @@ class PoseGate:
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
         """Return whether the new pose ``told`` agrees with ``doubted``, the last unexpected pose.
 
-        If it does not agree, ``doubted`` is counted as refused. In any case, ``doubted`` is then
-        forgotten. Without a ``doubted`` pose, the result is False.
+        If there is no ``doubted`` pose, the result is False. If the two poses do not agree,
+        ``doubted`` is counted as refused. After this call, there is no ``doubted`` pose.
 
-        ``gap``: covariance of the motion that is unknown because displacements were lost, and no
-        pose has shown their motion yet. It increases the tolerated difference.
+        ``gap``: covariance of the motion of lost displacements that no pose has shown yet. It
+        increases the tolerated difference.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)
@@ -102,9 +105,11 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether rounding or lost displacements can explain that a pose deviates by ``way``.
+    """Return whether rounding or lost displacements can explain a pose's deviation.
 
-    ``gap``: covariance of the motion that was lost since the last pose.
+    ``way``: the deviation from the expected pose.
+
+    ``gap``: covariance of the motion of the displacements that were lost since the last pose.
     """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS

@@ -19,8 +19,8 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Mean delay in s above which reads are reported as late. An adapter that delivers bytes every 10
-ms causes this mean delay."""
+"""Mean delay in s above which reads are reported as late. An adapter that delivers bytes every
+10 ms just reaches this limit: its mean delay is 5 ms."""
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0

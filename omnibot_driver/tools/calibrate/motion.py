@@ -28,9 +28,9 @@ It returns the command, or None to end the motion. A ``cmd_vel`` is in m/s, m/s 
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Time, in s, over which the tool compares the motions if the board rarely measures its motion.
+"""Time, in s, that replaces ``LOOK_S`` if the board rarely measures its motion.
 
-Between two measurements, the odometry is only predicted.
+Between two measurements, the odometry is only predicted, so a longer time is needed.
 """
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
@@ -161,12 +161,12 @@ class Obedience:
 
 
 def steady(command: Vector3, seconds: float) -> Law:
-    """Return a law that gives the same command for ``seconds``, then ends."""
+    """Return a control law that gives the same command for ``seconds``, then ends the motion."""
     return lambda now_s, _pose: command if now_s < seconds else None
 
 
 def stairs(steps: list[tuple[float, Vector3]]) -> Law:
-    """Return a law that gives these commands one after the other.
+    """Return a control law that gives these commands one after the other, then ends the motion.
 
     ``steps``: for each command, its duration in s and the command.
     """

@@ -205,7 +205,7 @@ class Feed:
     def _lacks(self) -> frozenset[str]:
         """Return those of ``imu``, ``start`` and ``pause`` that this driver's board does not have.
 
-        The result is empty while this is unknown.
+        The result is empty until the monitor has found out what the board has.
         """
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():

@@ -80,7 +80,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
     """The motion monitor stops the robot over a minute after its previous stop, or after ~/start.
 
-    This stop counts as a first one: motion is allowed again without ~/start.
+    The interlock treats this stop like the first one: motion is allowed again without ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
@@ -95,8 +95,8 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
     """The board has no ~/start. The motion monitor stops the robot a second time within a minute.
 
-    The release of the e-stop ends the refusal of motion. After the first stop, a release of the
-    e-stop does not end the refusal.
+    Then the release of the e-stop ends the refusal of motion. An earlier release, between the two
+    stops, does not end the refusal.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

@@ -87,10 +87,10 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A board restarts during a slow drive, with or without a line that reports it.
+    """A board restarts during a slow drive. The driver reports it, and the robot stops.
 
-    The robot stops, although the last command is still valid. Without this line, the times in the
-    board's other lines show the restart.
+    The robot stops although the last command is still valid. Some boards send a line that reports
+    the restart. If a board sends no such line, the times in its other lines show the restart.
     """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
@@ -118,8 +118,8 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 ) -> None:
     """The drive board restarts while its port is away, and its pose begins at zero again.
 
-    The port comes back ``away_s`` seconds after the restart. In this time, the board has run for
-    less or for more time than before the restart. The odometry does not jump in either case.
+    The port comes back ``away_s`` seconds after the restart. At that moment, the board's uptime is
+    shorter or longer than it was before the restart. The odometry does not jump in either case.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -140,11 +140,11 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 
 @pytest.mark.slow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
-    """While only its port is away, the drive board restarts. The computer stalls, too.
+    """The drive board restarts while its port is away. Meanwhile, the computer stalls.
 
-    The driver notices the restart, so the odometry does not jump. After a restart, the board's
-    lines seem to be late. A stall could also make lines late, but this stall has ended before the
-    port is back. So it has not delayed any line of the new connection.
+    The front board's port stays open. The driver notices the restart, so the odometry does not
+    jump. After a restart, the board's lines seem to be late. A stall can also make lines late. But
+    this stall ends before the port is back, so it cannot delay a line of the new connection.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)
@@ -189,7 +189,7 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
     """Restart a board while motion is commanded, and return why commands were refused.
 
-    Check that the robot is driven only after the front board has its configuration.
+    Also check that the robot drives again only after the front board has its configuration.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)
@@ -289,7 +289,7 @@ def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("read_s", [0.001, 0.05])
 def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) -> None:
-    """One line in twenty is lost for 5 s. The driver does not suspect a restart."""
+    """One line in twenty is lost for 5 s. The driver does not suspect a restart of a board."""
     bench = nominal()
     chance = random.Random(3)
 

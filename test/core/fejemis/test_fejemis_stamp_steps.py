@@ -17,9 +17,9 @@ from omnibot_driver.core.readings import ImuReading
 
 
 def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
-    """The second time is later than the first by the smallest amount a float can represent.
+    """The times of two readings differ by the smallest amount that a float can represent.
 
-    The second stamp is then 1 µs after the first.
+    The second reading then gets a stamp that is 1 µs after the stamp of the first.
     """
     stamped = StampedReadings()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

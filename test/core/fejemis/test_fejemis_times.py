@@ -97,7 +97,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """A restart soon after the start looks almost like late lines.
+    """A board restarts soon after its start, so its times look almost like those of late lines.
 
     The clock still notices the restart.
     """
@@ -115,8 +115,8 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
     """The first line is read late. Afterwards, every read brings two lines, sent 20 ms apart.
 
-    At first, the clock knows only the delay of the first line, which is too long. So the newer line
-    of each read seems to arrive early. The clock rejects the board times of at most three lines,
+    At first, the clock takes the delay of the first line for the usual delay. So the newer line of
+    each read seems to arrive too early. The clock rejects the board times of at most three lines,
     and is right afterwards.
     """
     clock = TeensyClock()
@@ -244,10 +244,9 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """Stamps must increase only among readings of the same kind.
+    """A reading has an earlier stamp than the reading before it, which is of another kind.
 
-    A reading has an earlier stamp than the reading before it, but is of another kind. So its stamp
-    is not changed.
+    The stamp is not changed: stamps must increase only among readings of the same kind.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -310,8 +309,8 @@ def numbered() -> Bench:
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
     """Return, for each published sample, the cycles of its gyro line and its acceleration line.
 
-    A cycle is a period of the board. It is returned as its number divided by 1000, because
-    ``numbered`` writes it like this into the lines.
+    A cycle is a period of the board. Each cycle is given as its number divided by 1000, as in the
+    lines from ``numbered``.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

@@ -117,8 +117,8 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """The user wants lines without checksums, which value 4 of command 0x11 selects.
 
-    This command also overwrites the left wheel's "short correction", another setting of the board.
-    The driver restores its value.
+    The same command also overwrites the left wheel's "short correction", another setting of the
+    board. The driver then restores the value of this setting.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver.confirmed:
@@ -137,8 +137,8 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    The public firmware does not count the ticks of a backward drive. After a backward drive, its
-    ticks prove nothing.
+    The public firmware does not count ticks while the robot drives backward. So after a backward
+    drive, the ticks prove nothing.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -217,7 +217,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
     """The user requests a record, for example of the times between ticks, while the wheels turn.
 
-    The record arrives complete. The unit of its times depends on the kind of firmware.
+    The record arrives complete, and its times have the right unit for this kind of firmware.
     """
     rig = Rig(nominal(firmware))
     rig.run(4.0)

@@ -39,8 +39,8 @@ class DeafBench(Bench):
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """A request for one date ends the periodic dates, so the driver sends the period again.
 
-    It sends the period several times, and one of these lines is lost. The period is still set in
-    the end.
+    The driver repeats the line with the period several times. Whichever of these lines is lost, the
+    board has the period in the end.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):

@@ -46,9 +46,9 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The settings stay unconfirmed. The driver cannot repeat them while the robot drives.
+    """The settings stay unconfirmed, and the driver cannot repeat them while the robot drives.
 
-    The session's next wake-up is always in the future.
+    The pacer is not woken all the time: the session's next wake-up is always in the future.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
@@ -58,9 +58,9 @@ def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
 
 @FIRMWARE
 def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> None:
-    """The user switches the LED. Settings change before all copies of the LED's line are sent.
+    """The user switches the LED, and the driver sends several copies of the LED's line.
 
-    The other copies are still sent.
+    The settings change when some copies are not sent yet. These copies are still sent.
     """
     bench = Bench(firmware)
     bench.hears = False

@@ -70,7 +70,8 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 ):
     """On a slow network with losses, the driver checks the IMU before it starts a motion.
 
-    It starts the motion within 0.2 s after the check. The network adds its delays.
+    The start reaches the server within 0.2 s after the end of the check, plus the delays of the
+    network.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
@@ -90,9 +91,10 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """After a curve, the start of a forward drive is lost. The server keeps the curve's heading.
+    """After a curve, the start of a forward drive is lost. The driver sends the start again.
 
-    The driver sends the start again. The old heading does not turn the odometry.
+    Until this second start, the server keeps the heading of the curve. This heading does not turn
+    the odometry.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)

@@ -126,7 +126,8 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
 ) -> None:
     """A new goal replaces the first one during a move.
 
-    After the move's reply, the next move begins at once.
+    When the server has replied to this move, the driver begins the first move to the new goal at
+    once.
     """
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
@@ -143,9 +144,9 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
-    """During a docking, the user commands the last goal again, which cancels the docking.
+    """During a docking, the user commands the goal from before the docking again.
 
-    The driver stops the move to the dock at once.
+    This cancels the docking: the driver stops the move to the dock at once.
     """
     bench = MartBench(firmware).ready()
     bench.go_to(0.0, 0.0, 0.0)
@@ -158,9 +159,10 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 
 
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
-    """Change the network: it loses commands that begin with ``lost``, and doubles the next RST IMU.
+    """Change the network: it loses some commands, and duplicates the next RST IMU.
 
-    The copy is 0.29 s late, and the reply to the copy is late by another 0.29 s.
+    ``lost``: the network loses all commands that begin with one of these words. The copy of RST IMU
+    is late by 0.29 s, and the reply to the copy is late by another 0.29 s.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
@@ -203,7 +205,8 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 ) -> None:
     """The command for a goal's turn is lost. A late ok of the IMU check seems to confirm the turn.
 
-    The odometry does not add the encoder's old count again.
+    The encoder still has the count of the motion before. The odometry does not add this count
+    again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
@@ -220,10 +223,10 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
-    """The command for a backward drive is lost. A late ok of the IMU check seems to confirm it.
+    """A backward drive's command is lost. A late ok of the IMU check seems to confirm the command.
 
-    The network has just duplicated replies, so the driver does not trust this ok. The odometry
-    adds no motion.
+    The driver does not trust this ok, because the network has just duplicated replies. So the
+    odometry adds no motion.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 3.0)
@@ -266,9 +269,9 @@ def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> Non
 
 
 def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
-    """The dock ends a move early.
+    """The dock ends a move early. The driver does not conclude that moves are short.
 
-    For the next goal, which is behind the robot, the driver requests the usual distance.
+    The next goal is behind the robot. The driver requests the usual distance for it.
     """
     bench = MartBench(dock_m=0.2).ready()
     assert bench.job(Job.DOCK, "DOCK", 40).success
@@ -277,10 +280,11 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
-    """The server executes a move, and then a late copy of the move, which the driver stops.
+    """The server executes a move, and then a late copy of the move. The driver stops the copy.
 
-    The encoder then shows only the distance of the copy. The driver knows from an earlier move how
-    far a complete move goes. It adds this distance, and continues to the goal.
+    The encoder then shows only how far the copy went. The driver knows from an earlier move how far
+    the complete move went before the copy, and adds this distance. Then it continues to the goal.
+    The stopped copy does not change the distances that the driver requests.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)
@@ -331,9 +335,10 @@ def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_mov
 
 @pytest.mark.parametrize("x_m", [1e4, 1e9, 1e60, 1e308, -1e300])
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
-    """A goal is so far away that the command for it could be too long for a request.
+    """A goal is farther away than 1000 m, so the driver rejects it.
 
-    The limit is 1000 m, so the driver rejects the goal. A later goal still moves the robot.
+    A later goal still moves the robot. The limit exists because the command for a farther goal
+    could be too long for a request.
     """
     bench = MartBench().ready()
     with pytest.raises(CommandRefused, match="the limit is 1000 m"):
@@ -358,9 +363,10 @@ def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
 def test_a_goal_ends_after_a_move_in_which_the_wheel_counts_the_wrong_way(
     goal: tuple[float, float, float], faults: NetworkFaults
 ) -> None:
-    """The encoder counts down while the robot drives forward, so each move increases the distance.
+    """The encoder counts down while the robot drives forward, so each move seems to lead away.
 
-    The driver discards the goal after the first move, and a notice names the parameter.
+    The driver discards the goal after the first move. A notice names the parameter
+    ``encoder_inverted``.
     """
     bench = MartBench(faults=faults, encoder_sign=-1).ready()
     bench.go_to(*goal)

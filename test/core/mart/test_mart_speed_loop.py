@@ -41,9 +41,9 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     """The measured speed of a motor is right at 18 units, and too low at 26 units.
 
     A straight line through both speeds would show motion at zero units, which is impossible. So the
-    driver uses another line, which shows no such motion, but is too low at 14 units. Then the true
-    speed at 14 units is measured, which is higher than the line. This measurement must not make the
-    line lower at 14 units.
+    driver uses another line, which shows no such motion. At 14 units, the speed of this line is too
+    low. Then the true speed at 14 units is measured. This measurement is higher than the line, so
+    it must not lower the line at 14 units.
     """
     line = MotorLine()
     for _ in range(8):
@@ -58,9 +58,9 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     slope: float, dead: float, rate_radps: float
 ) -> None:
-    """The driver has measured a drive and a turn on the spot.
+    """The driver has measured a drive and a turn on the spot, and computes another turn.
 
-    The units for another turn are off by at most one.
+    The motors' units for this other turn are wrong by at most one.
     """
     settings = MartSettings()
     per_unit_mps = settings.speed_per_unit * slope
@@ -112,7 +112,7 @@ def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
 def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
     """One wheel does not turn although the robot drives.
 
-    Within a second, the driver gives it more units.
+    Within a second, the driver gives the motor of this wheel more units.
     """
     loop, now = SpeedLoop(MartSettings()), 0.0
     loop.begin(4, False, now)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of how many IMU frames were lost, inferred from bytes that form no frame."""
+"""Tests of the frame schedule, which infers lost IMU frames from bytes that form no frame."""
 
 import pytest
 from hypothesis import given
@@ -13,7 +13,10 @@ kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
 def nominal(imus: int) -> FrameSchedule:
-    """Return a schedule that has received nominal mode for 1 s, then ``imus`` more IMU frames."""
+    """Return a schedule that has received all frames of nominal mode for 1 s.
+
+    ``imus``: number of IMU frames that it has received after that.
+    """
     rhythm = FrameSchedule()
     for _ in range(5):
         for _ in range(5):
@@ -32,9 +35,9 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """From the number of damaged bytes, the schedule counts the lost IMU frames.
+    """From the number of damaged bytes, the schedule infers the number of lost IMU frames.
 
-    A delta among these bytes is not counted.
+    The damaged bytes can include a delta, which is not counted as an IMU frame.
     """
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
@@ -67,7 +70,10 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """After 30 IMU frames in a row, all damaged bytes are counted as lost IMU frames."""
+    """After 30 IMU frames without another frame, only IMU frames can have been lost.
+
+    So all damaged bytes are counted as lost IMU frames.
+    """
     rhythm = nominal(0)
     for _ in range(30):
         rhythm.hear(ImuFrame, 0)

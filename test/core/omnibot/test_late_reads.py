@@ -136,7 +136,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 ) -> None:
     """After 24 equal frames, a reader is late at every read. No frame is lost.
 
-    The later frames have any content, at an acceleration of at least 1 g.
+    The later frames can have any content, but their acceleration is at least 1 g.
     """
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
@@ -182,9 +182,9 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter delivers pieces of 8 bytes. A piece may contain parts of two «Paused» texts.
+    """An adapter delivers pieces of 8 bytes, so a piece may contain parts of two «Paused» texts.
 
-    The board was silent between these texts. All texts are returned nevertheless.
+    The board is silent for a time between two texts. Nevertheless, all texts are returned.
     """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
@@ -242,7 +242,7 @@ LATE_ENDS = {
 }  # fmt: skip
 """For each case, the reads that complete a delta, after its first two bytes.
 
-Each is the time in ms since the read before it, and the bytes that are read.
+Each text is one read: the time in ms since the previous read, and the bytes that are read.
 """
 
 

@@ -15,9 +15,10 @@ NEVER_BELOW = -1.0
 def followed(
     skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
 ) -> tuple[ClockFit, float]:
-    """Fit a clock to the ticks. Return it, and its error in s at the last tick.
+    """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: the upper and the lower bound of a tick, minus its true time, in s.
+    ``above``, ``below``: functions of the tick's number. They return the upper and the lower bound
+    of the tick's time, minus the true time, in s.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
@@ -49,7 +50,7 @@ def test_between_near_bounds_the_middle_is_taken() -> None:
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """For 8 s, both bounds of the ticks' times drift by 0.1 ms per second.
+    """For 8 s, the bounds of a tick's time move away from the true time, by 0.1 ms per second.
 
     The error of the fitted clock stays below 0.5 ms.
     """
@@ -66,9 +67,9 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """Every twentieth read is late, so its lower bound is too high.
+    """Every twentieth read is late. The lower bound that a late read gives is too high.
 
-    These bounds do not raise the fitted line.
+    Such bounds do not raise the fitted line.
     """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
@@ -81,7 +82,7 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For 4 s, reads are slightly late, so their lower bounds contradict the upper ones.
+    """For 4 s, reads are slightly late. Their lower bounds contradict the upper bounds.
 
     The fit discards these lower bounds, because upper bounds always hold.
     """

@@ -81,8 +81,8 @@ surprises = st.tuples(
 )
 """Unusual reads, each followed by normal reads.
 
-Each is (readings, ticks since the previous read, delay in s, ``SampleBoundary`` or None, number of
-normal reads that follow).
+Each is (the list of readings in the read, ticks since the previous read, delay in s,
+``SampleBoundary`` or None, number of normal reads that follow).
 """
 
 
@@ -92,7 +92,7 @@ normal reads that follow).
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """Unusual reads come after a normal start. Their stamps do not depend on the shortcut."""
+    """A normal start is followed by unusual reads. Their stamps do not depend on the shortcut."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:
@@ -110,7 +110,8 @@ def test_surprises_are_stamped_alike(
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """If ticks arrive on time, the clock uses its shortcut for more than 90 % of the reads.
 
-    If it did not, the other tests would prove nothing.
+    The other tests compare stamps with and without the shortcut. They would prove nothing if the
+    shortcut were hardly ever used.
     """
     compared = 0
     compare = DeviceClock._compare

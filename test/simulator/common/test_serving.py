@@ -67,7 +67,7 @@ def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> N
 
 
 def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
-    """A user gives one link for each terminal. The links are used in the order of the channels."""
+    """A user gives one link for each terminal. The links are used in the order of the terminals."""
     links = [tmp_path / "a", tmp_path / "b"]
     with ServedBoard(ToyLines(), links=links) as served:
         assert [os.readlink(link) for link in links] == served.addresses
@@ -76,8 +76,8 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
     """A user asks for symbolic links that cannot be made. The program refuses them.
 
-    In three cases, the board has fewer serial ports than links, a file has the name of a link, and
-    the board has only a UDP port. The program leaves no other link behind.
+    The test has three cases: the board has fewer serial ports than links, a file already has the
+    name of a link, or the board has only a UDP port. The program never leaves another link behind.
     """
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
@@ -160,7 +160,7 @@ def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
 
 
 def test_the_facts_add_what_became_of_the_lines() -> None:
-    """The facts of a running board include the counts of dropped, lost and doubled data."""
+    """The ``facts`` of a running board include how many data were dropped, lost and duplicated."""
     with ServedBoard(ToyServer()) as served, served.lock:
         assert served.facts == {
             "x_m": 0.0,

@@ -233,9 +233,10 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """The angle sensor freezes without an error, so the steering runs to its end stop.
+    """The angle sensor has three faults, one after the other: frozen, absent, in error.
 
-    The angle line shows an absent or failed sensor.
+    A frozen sensor repeats its angle without an error, so the steering runs to its end stop. An
+    absent sensor and a sensor in error can be recognised in the angle line.
     """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")

@@ -23,9 +23,9 @@ def test_rm_answers_in_71_ms() -> None:
 
 
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
-    """The reply to F, a drive, comes later than the reply to R, a spin.
+    """The reply to F, a drive, comes after 220 ms. The reply to R, a spin, comes after 61 ms.
 
-    F first measures the bias of the gyro.
+    F takes longer, because the server first measures the bias of the gyro.
     """
     rig = Rig()
     assert rig.ask("F") == "ok"
@@ -331,7 +331,8 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
     """A backward drive (B) ends if an obstacle behind is nearer than 15 inches.
 
-    The robot moves 2 inches before the first sonar reading.
+    The first sonar reading comes after the robot has moved 2 inches. So an obstacle 15.5 inches
+    behind ends the drive.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)

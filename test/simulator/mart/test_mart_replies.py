@@ -177,8 +177,8 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 def test_a_sonar_measures_three_times_what_is_near() -> None:
     """An obstacle in front is near. The front sonar measures three times, which delays its reply.
 
-    The obstacle behind is farther than 15 inches, the limit of the rear sonar. So this sonar
-    measures once.
+    The obstacle behind is farther away than the limit of the rear sonar, 15 inches. So the rear
+    sonar measures only once.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"

@@ -132,7 +132,8 @@ def test_a_power_cycle_does_what_r_does() -> None:
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
     """A paused board reads the bytes of a motion frame as letters.
 
-    0x52 resets it, and 0x50 starts it.
+    The first frame contains R (0x52), which resets the board. The second frame contains P (0x50),
+    which starts it.
     """
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
@@ -145,9 +146,10 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """A board that is not awake gets a motion frame, and loses the three bytes that wake it.
+    """A board that is not awake gets a motion frame. The first three bytes wake it and are lost.
 
-    The board reads the other bytes as letters, here as a reset.
+    The board reads the next bytes as letters. In this test, they contain the letter R (0x52), so
+    the board resets.
     """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
@@ -156,9 +158,9 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
 
 
 def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
-    """A board that obeys letters within frames gets a frame with two 0x50, the letter P.
+    """A board that obeys letters within frames gets a frame with the letter P (0x50) twice.
 
-    The board pauses and starts again.
+    The first P pauses the board, and the second P starts it again.
     """
     board = SimulatedBoard(BoardSettings(running=True, receiver=ReceiverKind(letters="anywhere")))
     board.receive(wheels(0x50, 0, 0x50))
@@ -203,8 +205,8 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
     """A board whose receiver looks for idle gaps discards an incomplete frame after a gap.
 
-    The simulated board measures a gap by the times that the caller gives with the bytes. If the
-    caller gives no times, the simulated board measures the gap in ticks.
+    A caller can give the bytes with their times of arrival. The simulated board then measures the
+    gap by these times. Without such times, it measures the gap in ticks.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))
