@@ -28,7 +28,7 @@ class Diagnostics:
     """The publisher of the diagnostics of one link.
 
     * ``hardware_id``: text that distinguishes this robot from others.
-    * ``to_check``: advice for the user if the driver cannot decode the board's data.
+    * ``to_check``: what the user must check if the driver cannot decode the board's data.
     """
 
     def __init__(

@@ -34,8 +34,10 @@ DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an uninterruptible
 sleep, so the driver stops waiting."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
-"""Longest wait, in s, until a guard has repeated the stop and has ended. It includes the time that
-a slow guard process needs to start."""
+"""Longest wait, in s, until a guard has sent its repeated stop commands and has ended.
+
+It includes the time that a slow guard process needs to start.
+"""
 
 
 class Keeper:

@@ -38,13 +38,18 @@ UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. It replaces the shorter
 ``STANDS_WITHIN_S`` if no guard process can repeat Stop afterwards."""
 SILENCE_S: Final = 0.25
-"""Longest wait at shutdown, in s, for a second proof that the robot is at rest. For a slow board,
-the driver waits longer. The driver sends nothing during this wait. So the second proof shows that
-the last Stop was not damaged on the line: a damaged Stop might move the robot."""
+"""Longest wait for the second proof at shutdown that the robot is at rest, in s.
+
+After the first proof, the driver sends nothing and waits for the second. This one shows that the
+line did not damage the last Stop: a damaged Stop might move the robot. For a slow board, the driver
+waits longer.
+"""
 BOTH_PROOFS_S: Final = 2.4
-"""Longest sum of the waits for the first and the second proof, in s, even for a slow board. The
-process ends itself after ``driver.LONGEST_END_S``. If there is no proof, the guard needs part of
-this time to repeat Stop."""
+"""Longest time for both proofs at shutdown together, in s, even for a slow board.
+
+The driver's process ends itself after ``driver.LONGEST_END_S``. Within this limit, there must still
+be time for the guard to repeat Stop if there is no proof.
+"""
 
 T = TypeVar("T")
 
@@ -54,8 +59,9 @@ class Link:
 
     * ``port``: name of the port in messages to the user.
     * ``guard``: whether a separate process stops the robot when this process cannot.
-    * ``report``: receives a sentence when a line is missing, and None when all are open.
-    * ``failed``: receives the exception that ended a thread. Such an exception is always a defect.
+    * ``report``: receives a sentence when one of the board's ports is missing, and None when all
+      are open.
+    * ``failed``: receives the exception that ended a thread. Such an exception is always a bug.
 
     All function arguments except ``opener`` and ``failed`` are called one at a time, on any thread,
     in the order of the events.
@@ -156,8 +162,9 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether this call sent Stop and ended the threads. If the port was lost before, the
-        reader thread opens it once more to send Stop.
+        If the port is already lost, the reader thread opens it once more to send Stop.
+
+        Returns whether this call sent Stop and ended the threads.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:

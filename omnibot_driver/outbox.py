@@ -45,20 +45,20 @@ class Outbox:
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a successful ``claim``. Call this whether the delivery has succeeded or failed."""
+        """End a successful ``claim``. The caller must call this even if the delivery has failed."""
         self._delivering.release()
         if self._waiting:
             self.deliver()
 
     @property
     def full(self) -> bool:
-        """Whether the queue is full. While it is full, do not queue calls that can be omitted."""
+        """Whether the queue is full. The caller should then not queue a call that it can omit."""
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the queued calls, or leave them to another thread that is already making calls.
+        """Make the queued calls. If another thread is making calls, leave them to that thread.
 
-        If the queue is full, wait for that thread. Raises what the calls raise.
+        If the queue is full, wait for that thread first. Raises the exceptions of the calls.
         """
         waiting, delivering = self._waiting, self._delivering
         while waiting:  # checked again after the release, for calls that were put meanwhile
@@ -76,7 +76,7 @@ class Outbox:
             self._handed_over.set()
 
     def serve(self) -> None:
-        """Make the calls that are handed over, until ``close``."""
+        """Make the queued calls whenever ``hand_over`` asks for it. Return after ``close``."""
         closed = False
         while not closed:
             self._handed_over.wait()

@@ -183,7 +183,7 @@ class Reader:
             self._session.overran(self._earlier_overruns + self.overruns)
 
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
-        """Stop the robot, then end the use of the port.
+        """Stop the robot, and then give up the port.
 
         ``comes_back``: whether the reader will try to open the port again.
         """

@@ -22,7 +22,10 @@ class FakeNode:
 
 
 def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without tf2_ros, one warning says what to install, and how to switch transforms off."""
+    """Without tf2_ros, no transforms are published, and there is one warning.
+
+    The warning says what to install, and how to switch transforms off.
+    """
     monkeypatch.setitem(sys.modules, "tf2_ros", None)
     node = FakeNode()
     assert transform_publisher(node) is None
@@ -32,7 +35,7 @@ def test_without_tf2_there_is_one_warning_and_no_publisher(monkeypatch: pytest.M
 
 
 def test_with_tf2_its_broadcaster_gets_the_transforms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With tf2_ros there is one broadcaster for the node, and no warning."""
+    """If tf2_ros is installed, its broadcaster gets the transforms, and no warning appears."""
     sent: list[tuple[object, object]] = []
 
     class Broadcaster:

@@ -78,9 +78,10 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The estimated delay never exceeds the true one, so a command that is in time is not refused.
+    """The estimated delay of a command never exceeds the true delay.
 
-    The estimate includes the network and the driver's queue.
+    So a command that is in time is never refused, however much the clocks differ. The delay
+    consists of the time in the network and in the driver's queue.
     """
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
@@ -95,7 +96,7 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 def test_a_command_that_was_under_way_for_longer_is_refused(
     sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
 ) -> None:
-    """A sender is silent for a while. Its next command arrives late and is refused.
+    """A late command is refused, even if its sender was silent before it.
 
     The next command that arrives in time is accepted.
     """
@@ -114,9 +115,10 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """A sender's first command waits in the driver's own queue. It is refused.
+    """A command that has waited in the driver's own queue for too long is refused.
 
-    The driver measures this wait by its own clock, so it need not know the sender's clock.
+    This applies even to the first command of a sender. The driver measures the wait by its own
+    clock, so it need not know the sender's clock.
     """
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
@@ -228,9 +230,10 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
     silent_s: float, drift: float, late_s: float
 ) -> None:
-    """One of two senders on a host is silent for a while, and the host's clock drifts.
+    """Late commands of two senders on one host are refused, although one sender was silent before.
 
-    After an outage of the network, a late command of each sender arrives. Both are refused.
+    The host's clock drifts during this silence. Then the network fails for a while, and delivers a
+    late command of each sender.
     """
     receiver, silent, busy = Receiver(), Sender(), Sender(sent=1000)
     receiver.hear(busy, 99.0, 0.01)
@@ -259,7 +262,10 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """No command is refused while clocks drift for ten hours, with some silences of an hour."""
+    """No command is refused while the two clocks drift apart for ten hours.
+
+    From time to time, the sender sends nothing for an hour.
+    """
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -277,10 +283,11 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """A sender's first message is 0.5 s late, so its clock seems to the driver to be behind.
+    """After a sender's late first message, the driver finds two possible times for the next one.
 
-    So for the next message, the driver finds two possible times of sending: an estimated time, and
-    the time by the sender's clock. Here, the sender's clock is correct.
+    The first message is 0.5 s late, so the sender's clock seems to be 0.5 s behind. One of the two
+    times is the time by the sender's clock, corrected by 0.5 s. The other is not corrected. Here,
+    the sender's clock is right, so the second time is the true one.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -292,7 +299,8 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """After ten messages of a sender, the driver finds only one possible time of sending.
 
-    This time is correct although the sender's clock is an hour behind.
+    The sender's clock is an hour behind the driver's. The driver knows this difference by then, and
+    the time that it finds is correct.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

@@ -76,7 +76,8 @@ def most_calls(
 ) -> dict[int, float]:
     """Run ``work`` for each tick of a running board, and count its calls of Python functions.
 
-    Return the mean count for each kind of tick. The keys are the lengths of the ticks in bytes.
+    Return a mean count for each kind of tick. The key of a kind is the number of bytes that the
+    board sends in such a tick.
     """
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}
@@ -115,7 +116,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """With at most ``bound`` calls, the session makes an IMU reading from the bytes of one tick."""
+    """The session makes an IMU reading from the bytes of one tick in at most ``bound`` calls."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:

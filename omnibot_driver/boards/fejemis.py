@@ -83,7 +83,7 @@ def settings(values: Mapping[str, Any]) -> FejemisSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
-    """Return a function that opens both serial devices. If one is missing, it opens the other."""
+    """Return a function that opens both serial devices, or only one if the other is missing."""
     names = ("port", "front_port")
     for name in names:
         check_address(values[name], name, pollable=True)
@@ -101,7 +101,10 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's topics and services; return a publishing function per reading type."""
+    """Create this board's topics and services.
+
+    Return, for each type of reading, the function that publishes it.
+    """
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
 
     publish: Mapping[type, Any] = FejemisTopics(node, link, values).publish

@@ -247,9 +247,10 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``what``: name of the topic or device, which the reason contains. ``off``: whether the
-        action switches something off. Such an action is carried out in any state of the boards,
-        but the reason says if a port is not open.
+        ``what``: name of the topic or device, which the reason contains.
+
+        ``off``: whether the action switches something off. The boards' state never prevents such an
+        action. If a port is not open, the returned text says that the device may still be on.
         """
 
         def say(session: Session, now: float) -> str:
@@ -287,7 +288,7 @@ def _why_not_off(what: str, session: Session) -> str:
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
-    """Return the publisher, which already exists, of a topic that every board has."""
+    """Return the publisher of a topic that every board has. The driver has already created it."""
     name = node.resolve_topic_name(topic)
     return next(one for one in node.publishers if one.topic_name == name)
 

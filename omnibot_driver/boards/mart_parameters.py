@@ -75,7 +75,7 @@ DRIVING: Final = (
         "nominal_voltage",
         24.0,
         "V",
-        "Battery voltage at which linear_scale holds; the driver adapts its motor speeds to the"
+        "Battery voltage at which linear_scale is right; the driver adapts its motor speeds to the"
         " measured voltage.",
         low=6.0,
         high=40.0,
@@ -126,8 +126,8 @@ DRIVING: Final = (
         "odom_rate",
         20.0,
         "Hz",
-        "How often odom and its transform are published. Between two polls the driver predicts"
-        " them.",
+        "How often odom and its transform are published. Between two polls of the"
+        " controller, the driver predicts them.",
         low=1.0,
         high=50.0,
     ),

@@ -75,7 +75,9 @@ class ReadingClock(Protocol):
     ) -> list[float]:
         """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
-        ``now``: time of arrival. ``edge``: ``Board.edge`` after that call.
+        ``now``: arrival time of the readings' last bytes.
+
+        ``edge``: value of ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
@@ -112,7 +114,7 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Position in the stream of IMU samples at which the last read of the port ended.
+        """Position, in the stream of IMU samples, of the last byte that the last read brought.
 
         None if this position is uncertain or has not changed.
         """
@@ -132,7 +134,7 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        A command to stand still is never refused for this reason while the board runs.
+        While the board runs, this reason does not apply to commands to stand still.
         """
         return ""
 
@@ -159,7 +161,10 @@ class Board(Protocol):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
 
-        ``now``: time of arrival. If a reading needs later bytes as proof, a later call returns it.
+        If only later bytes can prove that a reading is correct, the call with those bytes returns
+        it.
+
+        ``now``: time of arrival.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -169,8 +174,8 @@ class Board(Protocol):
     def discard(self) -> None:
         """Discard the bytes that are held for decoding, because a long silence has followed them.
 
-        Otherwise, later bytes might complete a reading, which would get the arrival time of these
-        later bytes.
+        Otherwise, the bytes after the silence might complete a reading. The driver would give this
+        reading the arrival time of the later bytes, which is wrong.
         """
         return
 
@@ -190,26 +195,27 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the due packets that subscribe, poll or relay values; no motion commands.
+        """Return the packets that must be sent now to subscribe, to poll or to relay values.
 
-        Called at ``wake_at``. The driver always writes these packets.
+        They command no motion, and the driver always writes them. It calls this method at
+        ``wake_at``.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        OdometryReadings, NoticeReadings and results of requests in the returned list do not show
-        that the board is alive.
+        The list can contain OdometryReadings, NoticeReadings and results of requests although the
+        board is silent. So these do not show that the board is alive.
         """
         return []
 
     def leave(self) -> None:
-        """Prepare for the driver's exit: after this, ``due`` returns only what a stop needs."""
+        """Prepare for the exit of the driver: now ``due`` returns only packets for the shutdown."""
         return
 
     def reset_odometry(self) -> None:
-        """Move the origin of the OdometryReadings' frame to the robot's present pose."""
+        """Make the robot's present pose the origin of the frame of the OdometryReadings."""
 
     @property
     def shows_standstill(self) -> bool:
@@ -219,7 +225,7 @@ class Board(Protocol):
     def actuator(self, proof: StopProof) -> Actuator:
         """Return the actuator, which encodes motion orders. The driver calls this method once.
 
-        The actuator reports each stop and motion to ``proof``.
+        ``proof``: the object to which the actuator reports each stop and each motion.
         """
 
     def wake(self) -> Packets:
@@ -229,9 +235,10 @@ class Board(Protocol):
         """
 
     def start_requested(self) -> None:
-        """Record that the user has requested a start. If possible, ``start`` is called next.
+        """Record that the user has requested a start.
 
-        Not called for the driver's own starts, e.g. after a reconnect.
+        If the board can be started, the driver then calls ``start``. The driver does not call this
+        method for its own starts, for example after a reconnect.
         """
         return
 
@@ -248,7 +255,10 @@ class Board(Protocol):
         return NO_PACKETS
 
     def force_pause(self) -> Packets:
-        """Return packets that pause the board in any mode, even if earlier commands arrive late."""
+        """Return packets that pause the board in any mode.
+
+        They must also work if commands that were sent earlier arrive after them.
+        """
         return NO_PACKETS
 
     def reset(self) -> Packets:
@@ -279,8 +289,8 @@ class Board(Protocol):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return two sets of packets; the guard process sends one of them if this process hangs.
 
-        First: Stop. Second, for a latched e-stop: emergency stop, then Stop. Called after each
-        input and before each output.
+        The first contains Stop. The second is for a latched e-stop, and contains the emergency
+        stop, then Stop. The driver calls this method after each input and before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -18,22 +18,23 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Time of uninterrupted data, in s, after which a pause or reset is sent again.
+"""Time in s for which the board must send data without a pause before the driver repeats a request.
 
-A paused board sends a notice every second. If none arrives, the command was lost.
+The request is a pause or a reset. A paused board sends a «Paused» text every second. If the board
+sends only data, the command of the request was lost.
 """
 FLOWING_S: Final = 0.1
-"""Longest interval between two reads, in s, that is added in full to the time of uninterrupted
-data.
+"""Limit, in s, of the interval between two reads that counts in full for ``PAUSE_RETRY_S``.
 
-Of a longer interval, only ``FLOWING_S`` is added. A running board sends every 10 ms.
+Of a longer interval, only ``FLOWING_S`` is counted. A running board sends every 10 ms.
 """
 IN_FLIGHT_S: Final = 0.1
-"""Longest time, in s, that a command takes to the board, or a message of the board to the driver.
+"""Longest time in s that a command takes to the board, or that a message takes to the driver.
 
-A paused board sends a notice every second. If a notice comes within this time after a command, the
-board may have sent it before it received the command. Such a notice proves nothing. If data arrive
-within this time after a notice, the board may run, so the notice proves nothing either.
+A paused board sends a «Paused» text every second. If a text arrives within this time after a
+command, the board may have sent the text before it received the command. So the text does not show
+whether the board obeyed the command. If data arrive within this time after a text, the board may
+have begun to run meanwhile. So this text does not show that the board is paused.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -116,7 +117,7 @@ class ModeManager:
     def opened(self, now: float) -> None:
         """Wake the board after its port was opened, and start it if it should run.
 
-        Waking also ends a partial command.
+        The bytes that wake the board also end a command that the board has received only in part.
         """
         self.output = NO_PACKETS
         self._begin(now)
@@ -168,9 +169,10 @@ class ModeManager:
             self._reset(now)
 
     def give_up_start(self) -> bool:
-        """Fail an open ~/start request if the board refuses it; return whether this happened.
+        """If the board refuses a start, fail the open ~/start request, and return True.
 
-        The mode that was wanted before the request is then wanted again.
+        The wanted mode is then again the one before the request. Without such a request or refusal,
+        return False.
         """
         refusal = self._board.start_refusal
         if self._request is not Request.START or self._board.mode.running or not refusal:
@@ -182,9 +184,10 @@ class ModeManager:
         return True
 
     def heard_paused(self, now: float, *, continues: bool) -> None:
-        """Record that the board is paused.
+        """Record that the board has reported that it is paused.
 
-        ``continues``: whether the board was already paused before, and has not restarted since.
+        ``continues``: whether the board was already paused at its previous report, and has not
+        restarted since then.
         """
         in_flight = now - self._said_at < IN_FLIGHT_S
         restarted = self._mode_known and not continues
@@ -215,7 +218,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether data from a running board has no effect here.
+        """Whether data from a running board need not be processed here.
 
         This is so in the phase SETTLED, if no request is open and the board is not to be paused.
         """
@@ -247,9 +250,9 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Do what is due at ``now``.
+        """Do what is due at ``now``, which is at most one of three things.
 
-        A pause is confirmed, a start is sent again, or a request that has taken too long fails.
+        Report a pause as confirmed, let a request fail whose time is over, or send a start again.
         """
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
@@ -259,7 +262,10 @@ class ModeManager:
             self._say(self._board.start(), now)
 
     def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> Packets:
-        """Return the last packets to the board, without Stop if a standstill is ``proved``."""
+        """Return the last packets to the board.
+
+        ``proved``: whether a standstill is proved. If it is, the packets contain no Stop.
+        """
         stops = 0 if proved else LAST_STOPS
         return stops * self._board.stop() + self._last_request(on_exit) + self._board.switch_off()
 
@@ -284,8 +290,9 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether the board may have obeyed a P, or a P may still arrive. Another P would
-        resume a paused board, so the next P waits ``PAUSE_RETRY_S``.
+        ``with_p``: whether the board may already have obeyed a P, or whether a P may still be on
+        its way. A second P would resume a paused board. So the driver waits for ``PAUSE_RETRY_S``
+        before the next P.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

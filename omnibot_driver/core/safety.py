@@ -137,7 +137,7 @@ class SafetyStops:
         return "e-stop released; robot stopped until the next command"
 
     def set_out(self, now: float) -> None:
-        """Stop the robot, because the board may obey an old command.
+        """Stop the robot, because the board may carry out an old command.
 
         Call this method when the board begins to run, and when it falls silent.
         """
@@ -169,7 +169,7 @@ class SafetyStops:
             self._mode_manager.heard_nothing(now)
 
     def stalled(self, seconds: float, now: float) -> None:
-        """Stop the robot and fail the task, because this process was stalled for ``seconds``."""
+        """Stop the robot, because this process was stalled for ``seconds``. A long task fails."""
         self._liveness.stalled(now)
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()

@@ -323,4 +323,6 @@ class Session:
             raise CommandRefused(f"motion command refused: {reason}")
         self._commands.command(motion, now, expires_at=expires_at)
         if not motion.is_zero and self._calibration.wake_at < math.inf:
-            self._calibration.give_up("a motion command arrived; end the commands, then call again")
+            self._calibration.give_up(
+                "a motion command arrived; stop sending commands, then call again"
+            )

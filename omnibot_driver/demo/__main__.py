@@ -24,8 +24,10 @@ from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
 from omnibot_driver.simulator.common.options import DEFAULT_BOARD
 
 ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-"""Default environment variables, which keep the demo out of ROS domain 0, where a real robot may
-be."""
+"""Environment variables that the demo sets if the user has not set them.
+
+They keep the demo out of ROS domain 0, which a real robot may use.
+"""
 STOPPING_S: Final = 3.0
 ROW_EVERY_S: Final = 1.0
 

@@ -37,9 +37,9 @@ when its driver has run for a while."""
 class Robot:
     """The demo's robot, which this ROS node observes and steers through the driver's topics.
 
-    For every two odometry messages, the object publishes one velocity on ``cmd_vel``.
-    ``driving``: whether this velocity drives the square. Otherwise it is zero.
-    ``leg``: how many sides of the square are complete.
+    After every second odometry message, the object publishes a velocity on ``cmd_vel``.
+    ``driving``: whether this velocity drives the square. Otherwise it is zero. ``leg``: how many
+    sides of the square are complete.
 
     Raises DemoFailed if ROS does not start.
     """
@@ -75,7 +75,7 @@ class Robot:
     def close(self) -> None:
         """End the connection to ROS.
 
-        The executor is ended too. Otherwise it would report errors at the program's exit.
+        The executor must end too. Otherwise it would report errors when the program ends.
         """
         self._executor.shutdown(timeout_sec=0.0)
         rclpy.try_shutdown()

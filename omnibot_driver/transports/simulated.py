@@ -67,7 +67,7 @@ class SimulatedTransport:
         return sum(len(data) for _, data in packets)
 
     def interrupt(self) -> None:
-        """End a ``read`` that waits in another thread, or else the next ``read``."""
+        """End the ``read`` that waits in another thread. If none waits, end the next ``read``."""
         if (board := self._board) is not None:
             board.cancel()
 
@@ -115,7 +115,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         self._inbox.put(packet)
 
     def read(self, timeout_s: float | None) -> Packet:
-        """Return the oldest unread datagram, or the oldest consecutive bytes of one channel.
+        """Return the oldest unread data: one datagram, or consecutive bytes of one channel.
 
         Returns ``(0, b"")`` after ``timeout_s``, or after ``cancel``.
         """
@@ -129,7 +129,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
             return channel, bytes(data)
 
     def cancel(self) -> None:
-        """End the ``read`` that waits in another thread, or else the next ``read``."""
+        """End the ``read`` that waits in another thread. If none waits, end the next ``read``."""
         with self._came:
             self._cancelled = True
             self._came.notify_all()

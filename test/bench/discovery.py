@@ -21,9 +21,10 @@ PORT: Final = "11811"
 WINDOW_S: Final = 30.0
 """Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Time in s to wait for the drivers' start, and for the end of the observer's traffic.
+"""Time in s for which the program waits until the drivers have started.
 
-No event reports the last packet, so the time is fixed.
+After the search for the drivers, it waits as long again until the search's last packets have
+arrived. No event reports the last packet, so the time is fixed.
 """
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """

@@ -65,7 +65,7 @@ def commands(port: int, node: Node) -> None:
 
 
 def bare(_port: int, node: Node) -> None:
-    """Create topics and services with the names of the driver's, but without any function."""
+    """Create the same topics and services as the driver, but with callbacks that do nothing."""
     from diagnostic_msgs.msg import DiagnosticArray  # the other floors do not need these
     from rclpy.executors import SingleThreadedExecutor
     from std_msgs.msg import Bool, Float32MultiArray, String

@@ -37,7 +37,10 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def assert_obeys(bench: AnyBench, within_s: float = 3.0) -> None:
-    """Command motion until the robot moves. A MART that was restarted needs some time for this."""
+    """Check that the robot obeys: command motion until it moves, which must be within ``within_s``.
+
+    The default allows for a MART controller that was restarted, which needs some time.
+    """
     end = bench.now + within_s
     while bench.robot.stands:
         assert bench.now < end
@@ -117,7 +120,7 @@ def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
 ) -> None:
     """While the e-stop is latched, commands are refused.
 
-    The release of the e-stop does not move the robot.
+    After its release, the robot stays at rest until a new command arrives.
     """
     bench.drive_on()
     bench.estop(True)
@@ -144,9 +147,9 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 
 @pytest.mark.slow
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(bench: AnyBench) -> None:
-    """A reconnect, a stall or an e-stop ends a drive. The drive's command is discarded.
+    """After a reconnect, a stall or an e-stop, only a new command moves the robot.
 
-    Only a command that arrives afterwards moves the robot.
+    The command that was in effect before is discarded.
     """
     bench.drive_on()
     for name, event in EVENTS.items():
@@ -179,9 +182,9 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """A driving robot neither sends nor receives for 5 s, and may have driven on.
+    """The driver stops a robot that was disconnected while it drove, and is connected again.
 
-    When it is connected again, the driver stops it.
+    For 5 s, nothing arrives in either direction. The robot may have driven all the time.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False
@@ -195,9 +198,11 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_again(
     bench: AnyBench,
 ) -> None:
-    """Both directions of the line to a driving robot are cut. After 4 s, the robot receives again.
+    """The driver still repeats Stop when a line that was cut carries data to the robot again.
 
-    It still sends nothing. The driver repeats Stop for 5 s without a proof, so the robot stops.
+    The line is cut in both directions while the robot drives. After 4 s, the robot receives again,
+    but the driver still receives nothing. Without a proof of a stop, the driver repeats Stop for 5
+    s. So the robot receives a Stop.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False
@@ -219,9 +224,9 @@ def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> N
 
 @pytest.mark.slow
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
-    """The user commands 100 m/s.
+    """If the user commands 100 m/s, the robot drives at 0.5 m/s at most, which is the limit.
 
-    The robot drives at 0.5 m/s at most, plus 5 % for the measurement.
+    The test allows 5 % for its own measurement.
     """
     bench.drive_on(100.0, 1.0)
     before = bench.robot.way_m
@@ -231,9 +236,9 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 @pytest.mark.slow
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """The driver shuts down while the robot drives, and sends Stop until the robot is at rest.
+    """At shutdown, a driving robot stops and stays at rest. Later commands are refused.
 
-    Later commands are refused.
+    The driver sends Stop until the robot is at rest.
     """
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)

@@ -82,9 +82,9 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """The port is lost before the driver has written the Stop and the R of a reset.
+    """Requests that could not be written to a lost port are not written after it opens again.
 
-    The driver does not write them when the port is opened again.
+    The request is a reset. The port is lost before the driver has written its Stop and its R.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -96,9 +96,9 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """While a request is under way, the session's next wake-up is always in the future.
+    """During a request, the session never asks to be called before something is due.
 
-    This is tested with a board that sends data, and with a silent one.
+    Its ``wake_at`` is always in the future. The board sends data, or is silent.
     """
     bench = Bench()
     bench.speaks = speaks
@@ -111,9 +111,9 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """The user starts a board that already runs. The request succeeds, and the robot drives on.
+    """A request to start a board that already runs succeeds, and the robot drives on.
 
-    The driver still writes S, because another program's P may be on its way to the board.
+    The driver still writes S, because a P of another program may be on its way to the board.
     """
     bench.drive(0.3)
     start = len(bench.written)
@@ -164,10 +164,11 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("runs", [True, False])
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
-    """The first «Paused» text arrives 0.05 s after R, so it may be older than R.
+    """The driver sends only one R to a board that needs less than 0.1 s to boot.
 
-    The number in the next text follows the number in the first text. So both texts show that the
-    board has restarted.
+    The first «Paused» text arrives 0.05 s after R. The board may have sent this text before it
+    received R. But the number in the second text is one higher than in the first, so the board sent
+    both texts after its restart.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()
@@ -197,9 +198,10 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 @pytest.mark.parametrize("connected_s", [0.1, 0.25])
 def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
-    """A reset is requested before the first «Paused» text, and the board does not receive R.
+    """The first «Paused» text of a connection does not show that the board has restarted.
 
-    The first text has no earlier number to compare with, so it proves nothing. The reset fails.
+    A reset is requested before this text, but the board does not receive R. The driver knows no
+    earlier number to compare with the text's number. So the reset fails.
     """
     bench = Bench(run=False)
     bench.open()
@@ -230,7 +232,7 @@ def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
 
 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
-    """A pause has failed, and the user resets the board. Afterwards the driver starts the board.
+    """After a failed pause, a reset by the user starts the board again.
 
     The robot does not move until a new command arrives.
     """
@@ -248,9 +250,9 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 @pytest.mark.slow
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """A pause and then a reset fail, because the board receives nothing.
+    """The driver pauses the board when it receives again, although a pause and a reset have failed.
 
-    When the board receives again, the driver still pauses it.
+    Both requests failed because the board received nothing.
     """
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
@@ -263,9 +265,10 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """The board does not receive the R of a reset. The state changes to ``connecting`` only once.
+    """The state changes only twice when a board does not receive the R of a reset.
 
-    The state returns to ``nominal`` when the driver has seen that the board did not restart.
+    The first change is to ``connecting``. When the driver has found that the board did not restart,
+    the state returns to ``nominal``.
     """
     bench.hears = False
     bench.events.clear()

@@ -206,7 +206,8 @@ class Campaign(Outcome):
 
         The line continues to lose bytes during all stops.
 
-        ``number_of_life``: index of a group of stops in ``LIVES``. Each driver performs this group.
+        ``number_of_life``: index of a group in ``LIVES``. A group is a series of stops. Each driver
+        carries out the whole series.
 
         ``numbers``: one number for each driver. The number selects which bytes are lost.
         """
@@ -220,7 +221,7 @@ class Campaign(Outcome):
                     self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
-        """Run on a busy computer with an undamaged line, once in each round."""
+        """Test a drive on a busy computer with an undamaged line. Repeat this in every round."""
         row = self.row(
             f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
         )

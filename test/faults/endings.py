@@ -52,17 +52,18 @@ os.close(terminal)
 
 @dataclass(frozen=True)
 class Ending:
-    """A way to end the driver, and what must follow. The board must always receive Stop last.
+    """A way to end the driver, and the result that is expected. The board must receive Stop last.
 
-    ``before``: Python code that runs in the driver's process before the driver.
+    ``before``: Python code that runs in the driver's process before the driver starts.
 
     ``allowed_s``: how long the robot may still drive, in s.
 
     ``late_s``: additional time within which the driver's process must end, in s.
 
-    ``full``: whether the driver's port is full of old commands.
+    ``full``: whether the driver's port is full of old commands. The robot may then drive longer.
 
-    ``read``: whether the driver ends only when it next reads data.
+    ``read``: whether the driver does not end before it reads data again. The robot may then drive
+    longer.
     """
 
     end: Callable[[Rig], object]
@@ -74,9 +75,10 @@ class Ending:
     read: bool = False
 
     def __call__(self, rig: Rig) -> None:
-        """End the driver while the robot drives.
+        """End the driver while the robot drives, and check the result.
 
-        Check the exit code, that the robot stops, and that the board received Stop last.
+        The exit code must be right, the robot must stop, and the board must have received Stop
+        last.
         """
         rig.drive()
         self.end(rig)
@@ -113,9 +115,9 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Publish on the topic ``estop``, whose callback ends the driver.
+    """Publish on the topic ``estop``. Its callback then ends the driver.
 
-    The code in ``Ending.before`` has replaced the driver's usual callback of this topic.
+    The code in ``Ending.before`` has put this callback in the place of the usual one.
     """
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
@@ -129,9 +131,9 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """Send SIGINT after the cable was plugged in again, before the driver has opened the port.
+    """Send SIGINT when the cable is plugged in again, but the driver has not opened the port yet.
 
-    The robot still follows its last command. The driver must stop the robot, and then end.
+    The robot still carries out its last command. The driver must stop the robot, and then end.
     """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")

@@ -26,7 +26,7 @@ def make(settings: BoardSettings | None) -> SimulatedBoard:
 
 
 def sent(board: SimulatedBoard) -> list[bytes]:
-    """Return the frames that the board sent in its last tick."""
+    """Return the frames that the board sent in the most recent tick."""
     frames = []
     for frame in reversed(board.sent):
         if frame.tick != board.tick:
@@ -46,10 +46,10 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Return settings of a board behind a line that loses bytes.
+    """Return the settings of one of the boards that are tested behind a line that loses bytes.
 
-    ``number``: number of the board. It determines how the board finds frames, and whether it obeys
-    an emergency stop.
+    ``number``: number of the board. The number selects a receiver (the board's way to find frames),
+    and whether the board obeys an emergency stop.
     """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)

@@ -71,9 +71,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Keep the kernel's buffer full, even when the driver discards the content of the buffer.
+        """Keep the kernel's buffer full, even if the driver discards its content.
 
-        The terminal's output is suspended until the end of the ``with`` block.
+        The method suspends the output of the pseudo-terminal until the end of the ``with`` block.
         """
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:

@@ -52,8 +52,8 @@ class Bound:
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded with this chunking.
 
-        For the chunkings in ``BUSY_LOOPS``, the share is at most 99.9 %, because both adapter and
-        reader are late.
+        For the chunkings in ``BUSY_LOOPS``, the share is at most 99.9 %. In these, the adapter
+        delivers bytes late, and the reader also reads late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

@@ -15,16 +15,16 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-For each decoded frame, the judge searches forward for an equal true frame, and skips the true
-frames before it. If it skips more intact frames than this number, it also searches for the next
-decoded frame of the same read. If the second search also skips more intact frames than this number,
-the first decoded frame is wrong: it equals a much later true frame by chance. If the read has no
-next decoded frame, the first one is accepted.
+For each decoded frame, the judge searches forward for an equal true frame. It skips the true frames
+before that one. If it skips more than ``MOST_DROPPED`` intact frames, it also searches for the next
+decoded frame of the same read. If it skips more than ``MOST_DROPPED`` intact frames for this frame
+too, the first decoded frame is wrong: by chance, it equals a true frame that was sent much later.
+If the read has no next decoded frame, the judge accepts the first one.
 """
 REACH_BYTES = 600
-"""Number of received bytes by which the search for a read's true frames begins before the read.
+"""Number of received bytes before a read at which the search for its true frames begins.
 
-The search also includes the 300 bytes of the true stream before this place.
+The search begins a further 300 bytes earlier in the true stream.
 """
 
 

@@ -14,7 +14,10 @@ from truth import SCENARIOS, generate
 
 SECONDS = 2.5
 SEED = 25
-"""A seed with which a board is paused and sends a text. Few seeds do so in streams this short."""
+"""A seed for which the stream contains a pause of the board and a text.
+
+Few seeds have this effect in a stream as short as this one.
+"""
 
 
 @pytest.fixture(scope="module")

@@ -74,7 +74,7 @@ MADE_HERE = (".*", "__pycache__", "*.egg-info", "build", "install", "log")
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the repository's sources, as if all files were committed."""
+    """Return a copy of the repository's sources, with the files that are not committed yet."""
     copy = tmp_path_factory.mktemp("sources") / PACKAGE
     if not (ROOT / ".git").exists():  # a source archive contains only the sources
         return Path(shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*MADE_HERE)))

@@ -182,7 +182,7 @@ def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
 
 
 def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array:
-    """Return the colours that the camera sees along these rays."""
+    """Return the colour that the camera sees along each of these rays."""
     eyes = np.broadcast_to(EYE_M, rays.shape)
     depth = np.where(rays[:, 2] < 0.0, -EYE_M[2] / np.minimum(rays[:, 2], -1e-9), np.inf)
     colour = np.ones(rays.shape)
@@ -216,7 +216,7 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
     """Draw transparent solids over the colours behind them, from the lowest to the highest.
 
-    A face hides more of what is behind it if it is seen at a flat angle.
+    If a ray meets a face at a flat angle, the face hides more of what is behind it.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

@@ -13,7 +13,10 @@ WARNED = "calibration_file {} does not exist or is empty, so nothing is loaded f
 
 
 def said_of(path: Path, start_driver: Start) -> str:
-    """Start a driver with the calibration file, and return its only log line about the file."""
+    """Start a driver with the calibration file, and return the log line about the file.
+
+    There must be exactly one such line.
+    """
     driver = start_driver("/dev/null", calibration_file=path)
     driver.wait_for_line("is not a serial port")
     (line,) = [line for line in driver.lines if "calibration_file" in line]
@@ -24,9 +27,9 @@ def said_of(path: Path, start_driver: Start) -> str:
 def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     start_driver: Start, tmp_path: Path, is_there: bool
 ) -> None:
-    """The calibration file is missing or empty.
+    """The driver starts although the calibration file is missing or empty.
 
-    The driver starts, and warns of this because the path may be mistyped.
+    It logs a warning about the file, because the user may have mistyped the path.
     """
     path = tmp_path / "robt.yaml"
     if is_there:

@@ -29,7 +29,8 @@ refused = main(sys.argv[1:])
 os.environ["ROS_DOMAIN_ID"] = usual
 sys.exit(10 * refused + main([*sys.argv[1:], "--namespace", "absent"]))
 """
-"""Code that runs the report in a domain that ROS refuses, then without a driver to be found."""
+"""Code that runs the report twice: in a domain that ROS refuses, and where no driver can be found.
+"""
 
 
 def report(code: str, folder: Path, seconds: int) -> subprocess.CompletedProcess[str]:
@@ -46,7 +47,7 @@ def test_a_running_robot_is_listened_to(
     start_driver: Callable[..., Driver],
     probe_of: Callable[[Driver], Probe],
 ) -> None:
-    """``report --live`` finds the driver, and gives findings and a picture as for a bag."""
+    """``report --live`` finds a driver, and reports on its messages as on those of a bag."""
     driver = start_driver("sim://?seed=1")
     probe_of(driver).wait_for_state("nominal")
     done = report(QUICKLY, tmp_path / "out", 2)

@@ -37,9 +37,9 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str, skew: float) -> No
 def test_a_sample_that_a_loss_cut_and_a_delta_that_was_made_up_shift_none_either(
     line: str, scenario: str, skew: float, seed: int
 ) -> None:
-    """One byte in 100 is lost, on streams on which an old version of the driver failed.
+    """Stamps stay correct if one byte in 100 is lost.
 
-    The stamps are nevertheless correct.
+    The streams are those in which an old version of the driver computed wrong stamps.
     """
     stamped = stamp(line, scenario, 1e-2, skew, seed, 30.0)
     assert stamped.unevenness() < 0.2e-3
@@ -63,10 +63,11 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """The timer of an FTDI adapter runs exactly as fast as the board, so its phase is constant.
+    """An FTDI adapter's timer that never cuts a frame delays the stamps by the duration of a frame.
 
-    The driver can measure this phase only roughly. After 2 s, all stamps are late by the duration
-    of a frame, within 0.5 ms.
+    The timer runs exactly as fast as the board, so its phase is constant. Without frames that are
+    cut, the driver can determine this phase only roughly. The delay is tested after 2 s, to within
+    0.5 ms.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within
@@ -79,7 +80,7 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 @pytest.mark.parametrize("reader", [name for name in BUSY if "parts" not in name])
 @SCENARIOS
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str, skew: float) -> None:
-    """The computer is busy, so the reader is late. The stamps are as accurate as usual.
+    """The stamps are as accurate as usual if a busy computer reads late.
 
     Readers that read in parts are not tested here, because some of their stamps are wrong by a
     tick.

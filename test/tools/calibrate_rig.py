@@ -35,9 +35,9 @@ BUSY_S = 3.0
 ATTEMPTS = 5
 STALLED = "driver stalled for"
 OVERLOADED = ("did not run for", "not overloaded")
-"""Parts of the tool's error messages about a computer that is too busy.
+"""Texts in the tool's error messages that show that the computer is too busy.
 
-``STALLED`` is a part of the driver's log line about such a computer.
+``STALLED`` is the text in the driver's log that shows the same.
 """
 
 
@@ -63,7 +63,7 @@ class Rig:
 
         ``draws``: whether the picture is drawn, which takes a second.
 
-        If the calibration fails because the computer was too busy, it is repeated.
+        If the calibration fails because the computer was too busy, this method runs it again.
         """
 
         def read(question: str) -> str:

@@ -48,7 +48,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback. From ``AFTER_S`` seconds on, each call of it calls ``action``."""
+    """Return a callback that calls ``action`` at each call later than ``AFTER_S`` seconds."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -146,9 +146,9 @@ def test_a_value_of_the_diagnostics_is_found_by_its_name(robot: Robot, rigged: R
 
 
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
-    """The odometry shows that the robot goes too far. The tool stops the robot.
+    """The tool stops a robot that goes too far by its odometry.
 
-    A command above the speed limit is not sent.
+    The tool also refuses to send a command that is above the speed limit.
     """
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(
@@ -194,9 +194,10 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
     robot: Robot, rigged: Rig, late: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C is pressed before the first command, while the tool switches the motion monitor off.
+    """If ctrl-C comes before the first command, the motion monitor is on afterwards.
 
-    The monitor is on afterwards. The message does not ask the user to cut the power.
+    The user presses ctrl-C while the tool switches the monitor off. The tool's message does not ask
+    the user to cut the power.
     """
     set_parameters, presses = robot.set_parameters, [signal.SIGINT]
 
@@ -219,9 +220,10 @@ def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
 def test_a_motion_is_not_evaluated_if_the_clocks_differ(
     robot: Robot, rigged: Rig, behind_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot's clock is behind this computer's, or ahead of it. The tool ends with an error.
+    """The tool does not evaluate a motion if the robot's clock differs from this computer's clock.
 
-    Otherwise it would compare a command with the motion at another time.
+    With a clock that is behind or ahead, the tool would compare a command with the motion at
+    another time. So it ends with an error.
     """
     seconds = listener._seconds
     monkeypatch.setattr(listener, "_seconds", lambda message: seconds(message) - behind_s)
@@ -232,10 +234,9 @@ def test_a_motion_is_not_evaluated_if_the_clocks_differ(
 
 
 def test_parameters_are_restored_after_an_interruption(robot: Robot, rigged: Rig) -> None:
-    """The tool sets a parameter of the driver for a measurement. Then ctrl-C interrupts the tool.
+    """After an interruption, the tool can still restore parameters of the driver.
 
-    After ctrl-C, the tool can still restore former values, but it can set no parameter for a
-    measurement.
+    It can no longer set parameters for a measurement: ``set_parameters`` raises Interrupted.
     """
     robot.set_parameters({"linear_scale": 60.0})
     os.kill(os.getpid(), signal.SIGINT)
@@ -286,9 +287,9 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot does not come to rest after Stop. The error advises to cut the robot's power.
+    """If a robot does not come to rest after Stop, the error advises to cut the robot's power.
 
-    If another error has ended the motion, its message also contains this advice.
+    If the motion was ended by another error, the message of that error also contains this advice.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)

@@ -67,22 +67,22 @@ def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.n
 
 
 def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
-    """The expected signs of the wheels are those in the table of the commissioning guide.
+    """``wanted`` returns the signs of the wheels that the commissioning guide has in its table.
 
-    The test has a copy of this table.
+    The test contains a copy of this table.
     """
     assert [wanted(axis) for axis in range(3)] == [(-1, 1, 0), (-1, -1, 1), (-1, -1, -1)]
 
 
 @pytest.mark.parametrize("answer", ["+0-", "+ 0 -", "+,0,-", " +, 0, - "])
 def test_three_signs_are_understood(answer: str) -> None:
-    """Three signs are understood with or without spaces and commas."""
+    """``understand`` accepts three signs of wheel directions with or without spaces and commas."""
     assert understand(answer) == (1, 0, -1)
 
 
 @pytest.mark.parametrize("answer", ["", "+", "++", "+0-+", "abc", "1 0 -1", "yes"])
 def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
-    """The answer does not have exactly three signs. ``understand`` returns None."""
+    """``understand`` returns None for an answer that does not consist of three signs."""
     assert understand(answer) is None
 
 
@@ -110,7 +110,8 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 ) -> None:
     """One axis is commanded, and the user answers with one of the 27 patterns of wheel directions.
 
-    The expected pattern and its reverse are valid. All others are contradictions.
+    The pattern in the commissioning guide gives the sign 1, and its reverse gives -1. All other
+    patterns are contradictions.
     """
     expected = wanted(axis)
     if pattern == expected:
@@ -123,9 +124,9 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 
 
 def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
-    """If one axis is reversed, the signs mirror the robot.
+    """Signs with one reversed axis are a mirror image, signs with x and y reversed are not.
 
-    If x and y are both reversed, the signs turn the robot by 180°.
+    Reversed x and y together are a turn by 180°.
     """
     assert not mirrored((1, 1, 1))
     assert not mirrored((-1, -1, 1))
@@ -224,9 +225,10 @@ def resting(
 
 
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
-    """The user turns the robot by hand. A turn to the right, or by too little, is a contradiction.
+    """A turn by hand is accepted only if it is to the left and large enough.
 
-    The angle is about the vertical, without the gyro's bias.
+    Otherwise, ``require_left_turn`` raises Contradiction. It measures the angle about the vertical,
+    and subtracts the gyro's bias.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
@@ -241,9 +243,9 @@ def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
 
 
 def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
-    """The robot is not held still, or the gravity is wrong, or no reading was received.
+    """A measurement of gravity is rejected in three cases.
 
-    Each of these measurements is rejected.
+    The robot was not held still, the gravity has the wrong size, or no reading was received.
     """
     shaking = resting((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
     shaking.rate_radps[::2] = 0.5
@@ -265,9 +267,9 @@ def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
 
 @given(st.floats(0.3, 3.0), angles)
 def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> None:
-    """A command is doubled, and the robot drives twice as fast.
+    """If a command is doubled and the robot drives twice as fast, the tool finds velocity control.
 
-    The tool recognises velocity control. The command's unit and direction do not matter.
+    The unit of the command and its direction do not matter.
     """
     x, y = 0.06 * scale * math.cos(direction_rad), 0.06 * scale * math.sin(direction_rad)
     assert control_method(steady(x, y), steady(2 * x, 2 * y), 0.06) == "velocity"
@@ -283,9 +285,9 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """A command is doubled, but the robot drives no faster than before, or it stops at a goal.
+    """The tool finds positional control if a doubled command makes the robot no faster.
 
-    In both cases, the tool recognises positional control.
+    It also finds positional control if the robot stops at a goal.
     """
     assert control_method(slow, fast, 0.06) == "position"
 
@@ -299,7 +301,7 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     ],
 )
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
-    """The motion fits neither velocity nor positional control, so the tool finds no control method.
+    """If a motion fits neither velocity control nor positional control, the tool finds neither.
 
     For example, a command comes late, so the robot becomes faster during the measurement.
     """
@@ -310,11 +312,11 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """The robot gets the same command before and after a turn.
+    """Two motions, before and after a turn, show whether the driver assumes the right delta frame.
 
-    If the driver assumes the correct frame, odometry shows the same direction in the axes of the
-    body. With the wrong frame, the direction changes by the angle of the turn. Any other change is
-    an error.
+    The robot gets the same command in both motions. With the right frame, the odometry shows the
+    same direction in the axes of the body. With the wrong frame, the direction changes by the angle
+    of the turn. Any other change is an error.
     """
 
     def heading(rad: float) -> Drift:
@@ -329,10 +331,11 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """A turn on the spot shows whether the driver interprets the deltas correctly.
+    """The tool finds out from a turn on the spot whether the driver interprets deltas correctly.
 
-    The expected values are for a turn at 0.5 rad/s. In a delta of 40 ms, the robot turns by 20 mrad
-    and each wheel by 24 counts.
+    The robot turns at 0.5 rad/s. In a delta of 40 ms, it turns by 20 mrad, and each wheel by 24
+    counts. If the driver interprets these numbers in the wrong way, the odometry shows another
+    motion.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
@@ -343,9 +346,10 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """``drift`` uses only the data between two times. Missing data is an error.
+    """``drift`` computes the velocity only from the odometry between the two given times.
 
-    A robot that does not move is an error, too.
+    It raises an error if there is no odometry between them. ``require_motion`` raises an error if
+    the robot does not move.
     """
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))

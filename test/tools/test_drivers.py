@@ -24,9 +24,9 @@ def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
 
 
 def test_one_that_is_only_listened_to_does_not_run() -> None:
-    """A tool has subscribed to a driver's topics, so these topics exist although no driver runs.
+    """A driver whose topics have only subscribers is not running.
 
-    Only topics with publishers show that a driver runs.
+    A tool has subscribed to the topics, so they exist. But no program publishes on them.
     """
     counts = {"/a/state": 1, "/a/estop_active": 1, "/b/state": 0, "/b/estop_active": 0}
     node = SimpleNamespace(

@@ -28,9 +28,10 @@ class Actuator(Protocol):
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """Body velocity of the last command sent, after its rounding, in the board's axes.
+        """Body velocity of the last command that was sent, in the board's axes.
 
-        None if the command, such as a goal, does not determine the velocity.
+        It is the velocity after the board's encoding has rounded it. None if the command does not
+        determine a velocity, such as a goal.
         """
 
     @property
@@ -53,4 +54,4 @@ class Actuator(Protocol):
         """Record that packets of a request, such as a start, were sent. They command no motion."""
 
     def due(self, now: float) -> Packets:
-        """Return the packets to write now, possibly none, and regard them as written."""
+        """Return the packets to write now, possibly none. From then on, they count as written."""

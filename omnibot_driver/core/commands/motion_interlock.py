@@ -57,9 +57,9 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        On a board without ~/start, this ends the refusal of motion after the monitor's second stop
-        within 60 s. It does not end the refusal after a first stop, or a refusal that only ~/start
-        can end.
+        The motion monitor has stopped the robot twice within 60 s, and the board has no ~/start:
+        then the release ends the refusal of motion. It does not end the refusal after a first stop.
+        If the board has ~/start, only ~/start ends the refusal after the second stop.
         """
         if self.until is Until.ESTOP:
             self.start()
@@ -70,13 +70,13 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Record that a sender of commands was active at ``now``.
+        """Record that a sender of commands was active at ``now``, which can prolong a refusal.
 
         The refusal after a first stop by the monitor ends after ``timeout_s`` without commands. If
-        the refusal has not ended yet, this method begins the waiting time again at ``now``. Call it
-        when a command is refused, and after a stall of this process.
+        it has not ended yet, this time begins again at ``now``. Call this method when a command is
+        refused, and after a stall of this process.
 
-        ``stalled_s``: length of the stall, in s. A stall does not count as time without commands.
+        ``stalled_s``: length of the stall, in s. A stall is not regarded as time without commands.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now

@@ -217,7 +217,7 @@ def _steering(fields: list[str]) -> Message | None:
 
 
 def _digits(fields: list[str]) -> tuple[float, ...]:
-    """Return the unit of each field's last digit: 0.001 for "0.420"."""
+    """Return, for each field, the value of one step of its last digit: 0.001 for "0.420"."""
     return tuple(10.0 ** -max(0, decimals_of(field)) for field in fields)
 
 

@@ -19,8 +19,10 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""A function that receives the front wheel's angle in rad and the time in s. It returns whether a
-new fault is found: the wheel does not follow its commanded angle."""
+"""A function that receives the front wheel's angle in rad and the time in s.
+
+It returns whether this shows a new fault: the wheel does not turn to its commanded angle.
+"""
 
 
 class Inbound:
@@ -29,7 +31,8 @@ class Inbound:
     ``mode``: the mode of the robot. It is nominal while both boards send data and the drive board
     obeys.
 
-    ``relay_rad``: angle of the front wheel that must still be relayed to the drive board, or None.
+    ``relay_rad``: a new angle of the front wheel that the driver must still send to the drive
+    board; None if there is none.
     """
 
     def __init__(

@@ -139,7 +139,7 @@ class WheelConfiguration:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All numbers that can be written to the board; the control period cannot."""
+        """All numbers that the driver can write to the board: all except the control period."""
         return (
             self.left_radius_m,
             self.right_radius_m,
@@ -153,7 +153,8 @@ class WheelConfiguration:
 class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
 
-    According to the boards' help text, the distance comes first. Some boards send the track first.
+    By the boards' help text, this distance is the first of the two numbers. On some boards, the
+    track is the first.
 
     ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
     """

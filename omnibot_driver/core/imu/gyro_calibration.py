@@ -130,7 +130,7 @@ class GyroCalibration:
         return self.wake_at < math.inf
 
     def measure(self, token: object, now: float) -> None:
-        """Measure the bias in the next two seconds. The answer appears in ``answers``."""
+        """Begin to measure the bias for two seconds. The result is later added to ``answers``."""
         self._look = Look()
         self._token, self.wake_at = token, now + ANSWER_WITHIN_S
 

@@ -48,11 +48,11 @@ UNFORESEEN_TICKS: Final = 1.5
 """Limit, in ticks, of the difference between a reported and an expected count. Above this limit,
 the wheel has changed its speed without a new set-point."""
 UNFORESEEN: Final = 5.0
-"""Limit, in standard deviations, of the difference between a reported and an expected count. Above
-this limit, the wheel's motion cannot be the cause: the counter may have restarted."""
+"""Limit, in standard deviations, of the difference between a reported and an expected count. A
+larger difference cannot be a motion of the wheel: the counter may have restarted."""
 SAME_TICKS: Final = 0.6
-"""Least difference, in ticks, between an unchanged count and the expected count at which the filter
-is corrected. With a smaller difference, the next tick may not be due yet."""
+"""Least difference, in ticks, between the reported and the expected count at which an unchanged
+count corrects the filter. With a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): limits of the difference
@@ -62,34 +62,33 @@ DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""Standard deviation in m of a wheel's distance after 1 m without counted ticks: ``BLIND_M`` at a
-steady speed, ``SWINGING_M`` at an oscillating one."""
+"""Standard deviation in m of a wheel's distance after the wheel has rolled 1 m without counted
+ticks: ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
-"""Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
-speed. It is added to the effect of ``SWINGING_M``."""
+"""Standard deviation in m of the robot's x, and of its y, after a wheel has rolled 1 m at an
+oscillating speed. The error of the wheel's own distance (``SWINGING_M``) is separate."""
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviations of the error in a wheel's distance that lost reports cause, as a fraction of
 the distance that the wheel rolls while reports are lost. First value: at a steady speed. Second
 value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""``CORRECTED_PART``: standard deviation of the error that remains in a distance after a correction
-by the board's odometry (0x20), as a fraction of the part of the correction beyond
-``CORRECTED_TICKS``. The filter is linear, but the motion of a starting wheel is not. So large
-corrections leave an error."""
+"""Error that remains in a distance after the board's odometry (0x20) has corrected it: standard
+deviation, as a fraction of the part of the correction above ``CORRECTED_TICKS``. The filter is
+linear, but the motion of a starting wheel is not, so large corrections leave an error."""
 LATE_PART: Final = 0.6
-"""Standard deviation of the error in a wheel's distance that a late report causes, as a fraction of
-the distance that the wheel rolls during the delay. Only a wheel without counted ticks has this
-error."""
+"""Error in a wheel's distance that a late report causes: standard deviation, as a fraction of the
+distance that the wheel rolls during the delay. Only a wheel without counted ticks has this error.
+"""
 EQUAL_RPM: Final = 3.0
-"""Standard deviation, in RPM, of the true difference of two wheel speeds if the board's odometry
-shows that they are equal."""
+"""Standard deviation, in RPM, of the difference between the true speeds of the two wheels if the
+board's odometry shows that they are equal."""
 
 
 class Comparison:
-    """Comparison of the board's reports with the estimate of the motion filter ``motion``.
+    """Compares the board's reports with the estimate of the motion filter ``motion``.
 
-    Each comparison corrects the estimate.
+    Each comparison also corrects this estimate.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -132,11 +131,11 @@ class Comparison:
         return residual / motion.tick_m, residual**2 > UNFORESEEN**2 * unsure
 
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
-        """Correct the filter by ``ticks`` new ticks of a wheel.
+        """Correct the motion filter by ``ticks``: the ticks that the board has newly counted.
 
         ``duration_s``: time since the last report.
 
-        ``late_s``: how much later than usual the ticks arrived.
+        ``late_s``: how much later than usual the report with these ticks arrived.
         """
         motion, estimate = self._motion, self._motion.filter
         wheel, tick_m = motion.wheels[index], motion.tick_m
@@ -166,7 +165,7 @@ class Comparison:
     def begin_odometry(self) -> None:
         """Begin a new comparison with the board's odometry (0x20).
 
-        The reported and the expected change of heading, and the expected distance, begin at zero.
+        From now on, the changes of the heading and of the distance are counted from zero.
         """
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
@@ -178,9 +177,9 @@ class Comparison:
         self._motion.differing_mps = math.inf
 
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
-        """Correct the filter by what changed in the board's odometry (0x20) since its last report.
+        """Correct the motion filter by the changes in the board's odometry (0x20).
 
-        ``duration_s``: time since that report.
+        ``duration_s``: time since the last report of this odometry.
 
         ``late_s``: how much later than usual the new report arrived.
         """
@@ -228,14 +227,14 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Remove the distance that was wrongly added for a wheel that had already come to rest.
+        """Record that a wheel has come to rest, and remove the distance added since that time.
 
         ``index``: 0 left, 1 right.
         """
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:
-        """Correct the filter: both wheels have the same speed, which the board does not report."""
+        """Correct the motion filter: both wheels have the same speed, but it is not reported."""
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
         if sure and not any(speed.resting.chance for speed in self._speeds):

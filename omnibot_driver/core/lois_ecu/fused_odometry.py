@@ -10,8 +10,11 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
-"""Data from which the motion since the last estimate was computed. "standing" means that the robot
-is at rest. The heading comes from the board's odometry, not from the compass."""
+"""Data from which the motion since the last estimate was computed.
+
+"standing": the robot is at rest. "heading": the heading in the board's odometry, not from the
+compass.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,5 +42,5 @@ class FusedOdometry:
 
     @property
     def blind(self) -> bool:
-        """Whether the motion is known from commands instead of ticks."""
+        """Whether the motion was computed from the commands, because no ticks were counted."""
         return self.source in ("commands", "commands and heading")

@@ -3,7 +3,7 @@
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
 When a wheel stops, the public firmware keeps reporting the last speed that it measured. This speed
-is usually between 5 and 17 RPM, and lower than the speed that was reported before it.
+is usually between 5 and 17 RPM. The speed that was reported before it is usually higher.
 
 This module works on reported speeds and the time between them.
 """
@@ -15,8 +15,8 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
 """``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the last speed that the board measures before a
-wheel stops. A speed below this range belongs to a wheel that starts. A speed above it is not the
-last one, if it was measured correctly: at least one more tick follows."""
+wheel stops. If a speed is below this range, the wheel is starting. If a speed is above it and was
+measured correctly, it is not the last one: at least one more tick follows."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -28,10 +28,11 @@ LOST_S: Final = 0.25
 were lost, or the board rarely sends reports. Late reads hardly change the mean of four reports."""
 REPORT_S: Final = 0.2
 """Usual longest time in s between two reports. This module has a clock of its own. While reports
-are lost, each report advances this clock by at most ``REPORT_S``, so that the speeds before a gap
-are still known after the gap."""
+are lost, each report advances this clock by at most ``REPORT_S``. So the module still uses the
+speeds that were reported before a gap."""
 HIDDEN_PART: Final = 0.3
-"""Speed of this module's clock while the board reports no speeds, as a fraction of real time."""
+"""Speed of this module's clock while the board does not report the wheel's speed, as a fraction of
+real time."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -82,8 +83,10 @@ class RestingWheel:
         self._lone = False
         self._repeats = 0
         self._gaps = False
-        """Whether reports were being lost when the reported speed last changed. Always False while
-        the user's gains are set."""
+        """Whether reports were being lost when the reported speed last changed.
+
+        It is always False if the user has set the controller's gains.
+        """
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0
         self.chance = 0.0
@@ -94,9 +97,9 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Remember an estimated speed, because the board reports none.
+        """Store an estimate of the wheel's speed, because the board has not reported a speed.
 
-        ``since_s``: time in s, until now, in which the board has reported no speed.
+        ``since_s``: for how long the board has reported no speed, in s.
         """
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))

@@ -22,7 +22,7 @@ class SparseFilter:
         self.covariance = [[0.0] * states for _ in range(states)]
 
     def propagate(self, rows: Mapping[int, Terms]) -> None:
-        """Propagate the covariance by a transition. The caller changes the mean.
+        """Propagate the covariance by one step of the filter. The caller must propagate ``mean``.
 
         ``rows``: the rows of the transition matrix that differ from the identity matrix.
         """

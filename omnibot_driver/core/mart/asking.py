@@ -46,7 +46,7 @@ class Asking(Stops):
         self._ask_s = now
 
     def _stop_at_once(self, now: float) -> None:
-        """Make the next stop command due at once, in the states LOST and ASKING."""
+        """In the states LOST and ASKING, make the driver send the next stop command at once."""
         if self.state is State.LOST:
             self._said_lost_s = -math.inf
         elif self.state is State.ASKING:
@@ -92,9 +92,9 @@ class Asking(Stops):
             self._lose(now, "the right wheel is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
-        """Begin to stop any motion by the commands SRM and SM.
+        """Begin to stop a motion of unknown kind with the commands SRM and SM.
 
-        The queries have shown that SRM and SM cannot hang the server now.
+        The queries have shown that these commands cannot hang the server now.
         """
         if self._lost_told:
             self._lost_told = False

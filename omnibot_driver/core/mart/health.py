@@ -46,9 +46,9 @@ OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s after a failed start of RM (forward drive) within which RM may move the robot.
+"""Time in s after a failed RM (forward drive) in which RM can still move the robot.
 
-If the robot moves without a command in this time, RM is regarded as the cause.
+If the robot moves without a command in this time, the driver concludes that RM is the cause.
 """
 
 
@@ -65,7 +65,7 @@ class Health:
     ``reference_fails``: number of starts of RM in a row that have failed.
 
     ``outlived``: whether the server answered a stop late, after the driver had used the stop port.
-    If so, the next stop can fail.
+    If this has happened, the stop of the next motion can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -74,7 +74,7 @@ class Health:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: nothing is measured yet. ``outlived`` does not change."""
+        """Begin a new connection: forget all measurements, but keep ``outlived``."""
         self.heading_told: set[Motion] = set()
         self.heading_changes = 0
         self._defective = False
@@ -150,26 +150,28 @@ class Health:
     def outlives(self) -> None:
         """Record that the server answered a stop late, after the driver had used the stop port.
 
-        The stop port may still wait for the end of that motion, and hang in the next one.
+        The stop port may still wait for the end of the motion that it should stop. It may then hang
+        during the next motion.
         """
         self.outlived, self._may_be_restarted = True, False
 
     def restarted(self) -> None:
-        """Record that the server was restarted, so that its stop port does not hang."""
+        """Record that the server was restarted. After a restart, its stop port cannot hang."""
         self.outlived = self._may_be_restarted = False
 
     def was_silent(self) -> None:
         """Record that the server may have been restarted.
 
-        The next heading of the robot at rest shows whether it was (``rests``).
+        When the robot is next at rest, its heading shows whether the server was restarted
+        (``rests``).
         """
         self._may_be_restarted = True
 
     def rests(self, heading_rad: float) -> None:
-        """Evaluate the heading of a robot at rest, if the server may have been restarted.
+        """Find out from the heading of a robot at rest whether the server was restarted.
 
-        A restarted server reports a heading near zero. A change of the heading proves nothing: the
-        gyro drifts, and a user may turn the robot.
+        A restarted server reports a heading near zero. A heading that has only changed does not
+        prove a restart: the gyro drifts, and a user may turn the robot.
         """
         if not self.outlived or not abs(heading_rad) < MOST_RAD:
             return
@@ -186,7 +188,7 @@ class Health:
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """Record that the heading reported by the server has changed in this motion.
+        """Record that the reported heading has changed during a motion of the kind ``motion``.
 
         After HEADING_CHANGES changes, the driver assumes that the server reports the heading in all
         motions of this kind.
@@ -196,9 +198,9 @@ class Health:
             self.heading_told.add(motion)
 
     def reference_failed(self, now: float) -> None:
-        """Record that RM (forward drive) has failed.
+        """Record that RM (forward drive) has failed without a special reason.
 
-        The server gave no reason, or reported that no wheel has turned.
+        The server's reply contained no reason, or it said that no wheel has turned.
         """
         self.reference_fails += 1
         self._reference_failed_s = now
@@ -210,8 +212,8 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If RM (forward drive) has failed shortly before, the server has started the motors although
-        it reported a failure. Such a server is defective.
+        If the server reported a failure of RM (forward drive) shortly before, it has nevertheless
+        started the motors. Such a server is defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 
@@ -256,8 +258,8 @@ class Health:
         if self.outlived:
             return (
                 "the connection to the server was lost, and the server answers again without a"
-                " restart. It may not stop the robot after the next motion: restart the server,"
-                " then the driver"
+                " restart. The stop of the next motion can fail: restart the server, then the"
+                " driver"
             )
         if self._defective:
             return (

@@ -26,7 +26,7 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, half of the additional time is regarded as the age of its result.
+If a check takes longer, its result is regarded as older: by half of the additional time.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
@@ -76,9 +76,10 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return False for a failure that the caller must evaluate.
+        """Evaluate the reply to a check, and return whether this method could evaluate it.
 
-        This method evaluates only two failures: a dead IMU, and a server without RST IMU.
+        It evaluates a success and two failures: a dead IMU, and a server without RST IMU. The
+        caller must evaluate any other failure.
 
         ``took_s``: time from the check to the reply.
         """
@@ -98,8 +99,8 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Return whether the driver must now repeat the check of a dead IMU.
+        """Return whether the driver must now check a dead IMU again.
 
-        Only RST IMU is repeated, because it does not move the robot.
+        Only the check RST IMU is repeated in this way, because it does not move the robot.
         """
         return self.dead and self.word is RESET and now >= self.again_s

@@ -19,7 +19,7 @@ LEAST_S: Final = 0.05
 class MeanSpeeds:
     """The mean speeds of one motion.
 
-    ``spread_s``: time uncertainty of the last reply, in s.
+    ``spread_s``: uncertainty, in s, of the time to which the last reply refers.
     """
 
     def __init__(self) -> None:
@@ -37,7 +37,7 @@ class MeanSpeeds:
         self._track.append((at_s, self._way_m, self._yaw_rad))
 
     def correct(self, turn_rad: float) -> None:
-        """Add a correction of the heading to the turn of the next displacement."""
+        """Add ``turn_rad``, a correction of the heading, to the turn in the next displacement."""
         self._yaw_rad += turn_rad
 
     def forget(self) -> None:
@@ -67,7 +67,7 @@ class MeanSpeeds:
 
     @property
     def changes(self) -> tuple[float, float]:
-        """Speed (m/s) and turn rate (rad/s) between the last two counts, minus the mean values."""
+        """Speed (m/s) and turn rate (rad/s) between the last two counts, minus ``means``."""
         if not self.are_known:
             return 0.0, 0.0
         (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]

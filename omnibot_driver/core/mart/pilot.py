@@ -42,26 +42,27 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 STOPS_S: Final = 1.0
 """Time in s within which a stop is usually answered."""
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
-"""Time in s from the server's first reply after an absence to the first voltage query (VOLTS).
+"""Time in s from the server's first reply to the first query of the battery voltage (VOLTS).
 
-The voltage must be known before the first motion (STARTS_UP_S).
+The server was silent before this reply, and may have been restarted. The driver needs the voltage
+before the first motion, which begins after STARTS_UP_S.
 """
 VOLTS_S: Final = 10.0
-"""Limit of the delay of a voltage query (VOLTS): time in s since the previous VOLTS.
+"""Longest delay of a voltage query (VOLTS) after an unanswered request, in s since the last VOLTS.
 
 VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
-the driver delays VOLTS after such a request, but not beyond this limit.
+the driver then waits before it sends VOLTS. When this time has passed, it sends VOLTS in any case.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
 
-``SILENT_S``: from the last reply, plus twice the average duration of a query.
+``SILENT_S``: time since the last reply. Twice the average duration of a query is added to it.
 
-``SILENT_AFTER_MOVE_S``: from the last reply, while a duplicate of a move may be running.
+``SILENT_AFTER_MOVE_S``: time since the last reply, if a duplicate of a move may be running.
 
-``GREET_AGAIN_S``: between two HELLOs.
+``GREET_AGAIN_S``: time between two HELLOs.
 """
-COMMANDED: Final = "a motion command or a stop arrived; end the commands, then call again"
+COMMANDED: Final = "a motion command or a stop arrived; stop sending commands, then call again"
 ESTOPPED: Final = "the e-stop was latched meanwhile; release it, then call again"
 COPY_S: Final = 0.25
 """Time in s after a controlled move within which the server must answer a query (ENC or HELLO).
@@ -74,10 +75,10 @@ class Pilot(Hearing):
     """The pilot of one server. It decides which request is sent, and evaluates the replies."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the wanted command by ``wanted``.
+        """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A motion command or a stop cancels the current job. Exception: a repeated goal does not
-        cancel the download of a turn's record.
+        A motion command or a stop cancels the current job. There is one exception: if a goal is
+        repeated after its turn, the download of the turn's record continues.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -109,7 +110,7 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is busy, so that the driver expects it to be silent."""
+        """Return whether the server is busy. The driver expects no reply from a busy server."""
         if self._stopping is not None:
             return self.greeted and now < self._stopping.began_s + STOPS_S
         if self.state is State.MOVING:
@@ -119,17 +120,17 @@ class Pilot(Hearing):
 
     @property
     def ready(self) -> bool:
-        """Whether the server has answered the first stop.
+        """Whether the server has answered the driver's first stop.
 
-        The result is also False if the server is lost, or if it is not a MART controller.
+        The result is False if the server is lost, or if it is not a MART controller.
         """
         return self.greeted and not self.health.stranger and self.state is not State.LOST
 
     def fell_silent(self) -> None:
         """Begin a new connection after a long silence, because the server may have been restarted.
 
-        Nothing changes during a motion or a job. Nothing changes either if the server's stop port
-        may be hung, because the end of a network failure does not free this port.
+        Do nothing during a motion or a job. Do nothing either if the server's stop port may hang
+        (``Health.outlived``): when a network failure ends, the port still hangs.
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()
@@ -214,7 +215,7 @@ class Pilot(Hearing):
 
     @property
     def _greets_at(self) -> float:
-        """The time at which to send HELLO. An answer shows that the server is not absent."""
+        """The time at which the driver must send HELLO to check that the server answers."""
         if self.state is State.MOVING:
             return self._greet_s
         if self.state is State.STARTING:
@@ -240,11 +241,11 @@ class Pilot(Hearing):
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time at which to stop a suspected duplicate of a controlled move.
+        """The time at which the driver must stop a suspected duplicate of a controlled move.
 
-        It is infinity if no duplicate is suspected, and in any state other than STILL. The stop
-        commands are SL and SS. They must not be sent after a forward or backward drive, because
-        they would then hang the server.
+        The driver stops the duplicate with the commands SL and SS. The time is infinity if the
+        driver suspects no duplicate. It is also infinity in every state except STILL: after a
+        forward or backward drive, SL and SS would hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf

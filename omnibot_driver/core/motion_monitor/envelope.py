@@ -27,9 +27,10 @@ NOISE_RADPS: Final = 0.05
 The causes are encoder resolution, rounding, and a slope if the wheel controllers are slow.
 """
 SIDEWAYS: Final = 0.1
-"""Deviation allowed in any direction, as a fraction of the commanded speed or yaw rate.
+"""Deviation from the set-points that is allowed in any direction.
 
-The deviation is independent of the noise, so the squares of the two are added.
+It is a fraction of the commanded speed or yaw rate. This deviation and the noise are independent,
+so their squares are added.
 """
 OVERSHOOT: Final = 0.15
 """Overshoot allowed in any direction, as a fraction of the change of the set-point.
@@ -58,15 +59,20 @@ It is the ratio of the two noise limits, ``NOISE_MPS`` and ``NOISE_RADPS``.
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Directions in which the distance to the hull is computed. The result is at most 2 % too small."""
+"""Directions in which the distance to the hull is computed.
+
+There are few directions, so the computed distance can be up to 2 % too small.
+"""
 
 
 def outside(
     motion: BodyTwist, explained: Sequence[Velocity], *, heading_known: bool
 ) -> tuple[float, float]:
-    """Return how far the motion is outside the envelope, in m/s and in rad/s; <= 0: inside.
+    """Return how far the motion is outside the envelope, in m/s and in rad/s.
 
-    ``explained``: velocities that the set-points allow. The first is that of the current set-point.
+    A value of 0 or less means that the motion is inside.
+
+    ``explained``: the velocities that the recent set-points allow, that of the current one first.
 
     ``heading_known``: if False, the direction of the linear velocity is not checked.
     """

@@ -25,8 +25,8 @@ COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 """The bytes that occur in frame headers.
 
-If a frame has lost a byte, its apparent last byte belongs to the next header. So a frame that ends
-with one of these values is doubtful.
+If a frame has lost a byte, the decoder takes the first byte of the next header for its last byte.
+So a frame that ends with one of these values may be damaged.
 """
 
 _IMU: Final = struct.Struct(">2s6h")
@@ -168,7 +168,7 @@ def length_begun(data: bytes | bytearray, at: int) -> int:
 
 
 def is_text(data: bytes | bytearray, at: int) -> bool:
-    """Return whether the byte at ``at`` begins a «Paused» text instead of a header."""
+    """Return whether a «Paused» text, and not a frame, begins with the byte at position ``at``."""
     return data[at] == _TEXT_BEGIN
 
 

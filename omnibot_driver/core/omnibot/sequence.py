@@ -16,24 +16,24 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Limit, in s, for the difference between the elapsed time and the time that a counter shows. If
-the difference is larger, the board may have restarted.
+"""Limit, in s, for the difference between the elapsed time and the time shown by a counter.
 
-The drift of the clock is added to this limit. The limit is above the largest error of the arrival
-times: 0.24 s, if the host's buffer is full and every tenth byte is lost.
+If the difference is larger, the board may have restarted. The limit is larger for a longer elapsed
+time, because the board's clock drifts (``DRIFT``). Arrival times are wrong by 0.24 s at most, if
+the host's buffer is full and every tenth byte is lost. So this error does not exceed the limit.
 """
 DRIFT: Final = 0.01
-"""Largest relative error of the board's clock, and so of the time that a counter shows.
+"""Largest relative error of the board's clock, and of times that are computed from its counters.
 
 After minutes of silence, this error is so large that the counter cannot show a restart. Only the
 board's pose can then prove a restart.
 """
 EARLY_S: Final = 0.2
-"""Largest time in s by which the count after a restart may be ahead of the elapsed time.
+"""Largest time in s by which a counter after a restart may be ahead of the elapsed time.
 
-The elapsed time begins when the last delta before the restart is read. If this delta was read late,
-the elapsed time is too short. The elapsed time also contains the duration of the restart, which is
-longer than ``EARLY_S``. So the count is ahead only if the delta was read very late.
+The elapsed time begins when the driver reads the last delta before the restart. It includes the
+duration of the restart, which is longer than ``EARLY_S``. So it is usually longer than the time
+that the counter shows. It is shorter only if the driver read the last delta very late.
 """
 LONG_GAP_S: Final = 1.0
 """Duration of lost deltas, in s, above which the next pose cannot show a restart: the last delta is
@@ -46,7 +46,8 @@ class Step:
 
     * ``lost``: number of missing deltas that were not reported before.
     * ``duration_s``: time that the delta covers; None if unknown.
-    * ``restarted``: whether the counter seems to have restarted; only the board's pose proves it.
+    * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
+      it.
     """
 
     lost: int
@@ -67,21 +68,23 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether a pose has ever come after the expected number of deltas. Until this has
-        happened, the counters of poses are ignored."""
+        """Whether a pose has ever come after the expected number of deltas.
+
+        Until then, the counters of poses are ignored.
+        """
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """Counter of the last delta, if it was too far ahead of the elapsed time; else None.
+        """Counter of the last delta, if it was too high for the elapsed time; else None.
 
-        Such a counter may be damaged. Until the next delta continues this counter, the number of
-        lost deltas is computed from the elapsed time.
+        Such a counter may be damaged. If the next delta continues it, it was right. Until then, the
+        number of lost deltas is computed from the elapsed time.
         """
         self._left: tuple[int, float, int] | None = None
-        """The last counter before a supposed restart, its arrival time in s, and the first counter
-        after it."""
+        """The supposed restart, to withdraw it later: the last counter before it, the arrival time
+        of that counter in s, and the first counter after it."""
 
     def pause(self) -> None:
-        """Record that the board paused. Its next counter may continue, or restart at zero."""
+        """Record that the board paused. Its counters may then continue, or restart at zero."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
@@ -132,8 +135,9 @@ class Sequence:
     def pose(self, count: int, now: float) -> Step:
         """Return what the counter of a new pose shows about lost deltas and about a restart.
 
-        ``now``: arrival time in s. In the result, ``lost`` is the number of missing deltas whose
-        motion is contained in the pose.
+        ``now``: arrival time of the pose in s.
+
+        In the result, ``lost`` is the number of missing deltas. The pose contains their motion.
         """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
@@ -160,7 +164,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if ``count`` continues the old counter, not the new one."""
+        """Withdraw a supposed restart if ``count`` shows that the old counter has continued."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

@@ -2,9 +2,10 @@
 
 """The fitted clock: a straight line that gives the time of each tick.
 
-The line is fitted to bounds of the times. A *latest* point (n, t): a read at time t brought tick n,
-so the tick was not later. An *earliest* point (n, t): a read at time t did not bring tick n yet, so
-the tick was not earlier. docs/internals/time.md explains the fit.
+The line is fitted to upper and lower bounds of the times. A *latest* point (n, t) is an upper
+bound: a read at time t contained tick n, so the tick was not later. An *earliest* point (n, t) is a
+lower bound: a read at time t did not contain tick n yet, so the tick was not earlier.
+docs/internals/time.md explains the fit.
 
 This module knows ticks and times; it does not know what is sampled, nor how ticks are counted.
 """
@@ -26,22 +27,26 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""The fitted clock is an edge of the latest points' lower hull: the edge at this fraction of the
-hull's time span.
+"""Fraction of a time span that decides which edge of the lower convex hull is the fitted clock.
 
-With a larger fraction, the clock follows recent points more closely, but jitter affects it more.
+The hull is that of the latest points. The fitted clock is the edge at this fraction of the hull's
+time span. With a larger fraction, the clock follows recent points more closely, but jitter affects
+it more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
 late ones cannot be recognized."""
 LATE_PART: Final = 0.1
-"""Largest assumed fraction of late reads. A read is late if its delay exceeds ``LATE_S``, in s."""
+"""Largest fraction of the reads that is assumed to be late.
+
+A read is late if its delay exceeds ``LATE_S``, in s.
+"""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest difference between the upper and the lower bound of a block, as a fraction of a period.
-If the bounds differ more, the lower bound is not used.
+If they differ more, the lower bound is not used.
 
-An adapter with a 16 ms timer causes a difference of 2 ms, a fifth of a 10 ms tick.
+With an adapter with a 16 ms timer, they differ by 2 ms, which is a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]
@@ -66,15 +71,15 @@ class ClockFit:
         self._block_from = first[0]
 
     def at(self, tick: int) -> float:
-        """Return the time of this tick in s."""
+        """Return the time of the tick with this number, in s."""
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
     def see(self, latest: Point, *, cut: bool) -> None:
-        """Add an upper bound: the number of a tick, and a time in s by which it had arrived.
+        """Add an upper bound: the number of a tick, and a time in s by which the tick had arrived.
 
-        The tick is the newest one of a read.
+        The tick is the newest one that a read contains.
 
-        ``cut``: whether the read ended within this tick's sample.
+        ``cut``: whether the read ended in the middle of this tick's sample.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
@@ -110,9 +115,9 @@ class ClockFit:
             self._lay_under()
 
     def _height(self, point: Point) -> float:
-        """Return the time of a point, minus the fitted period times the number of its tick, in s.
+        """Return the height of a point above a line through zero with the fitted slope, in s.
 
-        Of two points, the lower one has the smaller result.
+        It is the point's time, minus the fitted period times the number of the point's tick.
         """
         return point[1] - self.slope_s * point[0]
 
@@ -121,9 +126,9 @@ class ClockFit:
         return min(max(slope_s, least), most)
 
     def _lay_between(self) -> bool:
-        """Place the fitted clock in the middle of all bounds and return True.
+        """Place the fitted clock in the middle between all upper and lower bounds, and return True.
 
-        If the bounds contradict each other, forget the earliest points and return False.
+        If no straight line fits between them, forget the lower bounds and return False.
         """
         flattest, steepest = -math.inf, math.inf
         above = _hull([at for at, _ in self._latest])

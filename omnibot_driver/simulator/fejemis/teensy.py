@@ -91,7 +91,7 @@ class Teensy(Generic[C]):
     def items(self) -> dict[str, Callable[[], str]]:
         """Return, for each line that the host can request, the function that writes the line.
 
-        The keys are the names that a subscription uses for the lines.
+        The keys are the names of the lines, which are also used to subscribe to them.
         """
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
@@ -117,7 +117,7 @@ class Teensy(Generic[C]):
         """Reset the state, as after switching on."""
 
     def started(self) -> None:
-        """Adjust the state at the end of each boot."""
+        """Set the state that this Teensy has at the end of each boot."""
 
     def cycle(self) -> None:
         """Run one control cycle."""

@@ -80,7 +80,7 @@ class Vehicle:
 
     ``turns``: revolutions of the left and the right wheel since construction.
 
-    ``wanted_radps``: speeds that the controllers of the two wheels must reach.
+    ``wanted_radps``: set-points of the speed controllers of the two wheels.
 
     ``powered``: whether the controllers drive the wheels. Otherwise, the wheels coast to a stop.
 

@@ -42,8 +42,8 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: for each encoder, the board's two factors that correct short and long levels.
-    The simulated levels have exactly the lengths for which these factors are right.
+    ``corrections``: for each encoder, the two factors with which the board corrects short and long
+    levels. The simulated levels have exactly the lengths for which these factors are right.
     """
 
     def __init__(

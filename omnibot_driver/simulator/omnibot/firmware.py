@@ -212,7 +212,7 @@ class SimulatedBoard:
         return b"".join(sent)
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick; return the sent bytes as a list of one packet, or an empty list."""
+        """Advance by one tick. Return one packet with the sent bytes, or no packet, as a list."""
         data = self.step()
         return [(0, data)] if data else []
 

@@ -59,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wakes-while-booting",
         action="store_true",
-        help="bytes that arrive during the boot count as wake-up bytes. The board needs three",
+        help="count bytes that arrive during the boot as wake-up bytes (the board needs three)",
     )
     parser.add_argument(
         "--ignore-estop", action="store_true", help="simulate a firmware without emergency stop"

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""New gains are regarded as worse if they increase a step's error by more than this factor."""
+"""New gains are regarded as worse if a step's error with them exceeds the previous one by this
+factor."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,9 +37,9 @@ BEGUN: Final = np.array([0.0, 0.4, 0.8])
 The starting position decides in which control period a tick arrives.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Simulated times at which the board first sends tick counts, as fractions of the sending period.
+"""Times in a simulated step at which the board first sends tick counts.
 
-While the board sends, it notices encoder ticks late.
+They are fractions of the sending period. While the board sends, it notices encoder ticks late.
 """
 DISTURBED: Final = 0.02
 """Additional overshoot that is allowed if the board sends its tick counts during a step.
@@ -49,9 +49,10 @@ It is a fraction of the speed, and is added to the user's limit.
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
-"""Candidates for Td, as fractions of the nominal control period.
+"""Candidates for Td above 0, as fractions of the nominal control period.
 
-With Td = 0, an oscillation from one control period to the next does not decay.
+They are used if a phase margin is required. With Td = 0, an oscillation from one control period to
+the next would not decay.
 """
 
 
@@ -131,7 +132,8 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 def target_of(plant: Plant, goals: Goals) -> float:
     """Return the set-point after the step, in RPM.
 
-    It is ``goals.destination`` times the speed at full duty, in whole RPM, but at least 5 RPM.
+    It is the fraction ``goals.destination`` of the speed at full duty, rounded to whole RPM. If the
+    result is below 5 RPM, it is 5 RPM.
     """
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 
@@ -151,10 +153,10 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 
 
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
-    """Return the predicted traits of a step, for several starting positions of the wheel.
+    """Predict a step from several starting positions of the wheel, and return its traits.
 
-    The result has the largest overshoot, the longest settling time and the mean error of all
-    starting positions.
+    The result contains the largest overshoot and the longest settling time of all starting
+    positions, and the mean of their errors.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -163,7 +165,7 @@ def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
 
 
 def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
-    """Return the largest overshoot of a step if the board sends tick counts during the step."""
+    """Return the largest overshoot of a step during which the board sends its tick counts."""
     target = target_of(plant, goals)
     begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
@@ -212,7 +214,7 @@ def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
 
 
 def _unlike(shown: Response, model: Response) -> float:
-    """Return the mean square of the relative difference of two responses in their first 1.5 s."""
+    """Return the mean square of two responses' relative difference, over their first 1.5 s."""
     times_s = shown.times_s[shown.times_s < OVER_S]
     told_rpm = np.interp(times_s, model.times_s, model.rpm)
     return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

@@ -24,9 +24,9 @@ LARGEST: Final = 0.5
 A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""Largest relative error of a time between ticks that is used, in standard deviations.
+"""Largest relative error of a time between ticks that is used.
 
-The standard deviation is estimated from the median size of all errors.
+The unit is the standard deviation, which is estimated from the median size of all errors.
 """
 EXPLAINED: Final = 0.4
 """Fitted marks are accepted only if they explain at least this fraction of the variance.
@@ -60,9 +60,10 @@ class Marks:
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors that the marks cause in ``count`` successive times.
+        """Return the relative errors that the marks cause in ``count`` times between ticks.
 
-        ``first``: number of the mark at which the first of these times between ticks begins.
+        The times follow each other. ``first``: number of the mark at which the first of them
+        begins.
         """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
@@ -94,7 +95,9 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the number of the mark at which a record begins, by the best agreement of the errors.
+    """Return the number of the mark at which a record begins.
+
+    It is the mark for which ``row`` agrees best with ``steps``.
 
     ``row``: relative errors of the record's times between ticks.
 
@@ -109,8 +112,8 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    It is the median of the errors of all times between these two marks. Then the mean is
-    subtracted, so that the mean of the result is zero.
+    It is the median of the errors of all times from this mark to the next. The mean of these
+    medians is then subtracted, so that the mean of the result is zero.
 
     ``rows``: for each record, the relative errors of its times between ticks.
 

@@ -17,11 +17,13 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
-    ``rows``: rows of successive residuals. ``lags``: the largest lag.
+    If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0. Displaced encoder
+    marks cause -0.5, and independent errors cause 0. If ``lags`` is larger, each value is
+    multiplied by a factor that decreases with the lag.
 
-    If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0: displaced encoder
-    marks cause -0.5, and independent errors cause 0. With more lags, the result is tapered: larger
-    lags get smaller factors.
+    ``rows``: rows of successive residuals.
+
+    ``lags``: the largest lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -43,8 +45,9 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 def whitener(of_lags: Column, length: int) -> Column:
     """Return the matrix that removes an autocorrelation from a row of ``length`` residuals.
 
-    ``of_lags``: the autocorrelation for lags from 0 on. The upper left part of the matrix is the
-    matrix for a shorter row.
+    For a shorter row, use the upper left part of this matrix.
+
+    ``of_lags``: the autocorrelation for lags from 0 on.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]

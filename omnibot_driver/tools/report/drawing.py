@@ -79,7 +79,7 @@ def line(axes: Axes, times_s: Array, values: Array, colour: str, label: str, **m
 
 
 def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> None:
-    """Draw points. If there are too many, draw only every n-th point and the extremes."""
+    """Draw points. If there are too many, draw only the extremes and every n-th of the points."""
     every = -(-len(times_s) // POINTS) or 1
     extremes_s, extremes = envelope(times_s, values)
     times_s = np.concatenate([times_s[::every], extremes_s])

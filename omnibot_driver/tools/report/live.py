@@ -81,9 +81,9 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """Find the robot; return its namespace and topics, every topic's type, and whether it is alone.
+    """Find the robot; return its namespace, its topics, the types of all topics, and "alone".
 
-    "Alone" means that no other robot was found.
+    "alone" is True if no other robot was found.
     """
     began_s = time.monotonic()
     while True:

@@ -51,8 +51,8 @@ class Series:
     def other_clock_s(self) -> float:
         """How far the recorder's clock is ahead of the timestamps' clock, in s.
 
-        The value is the median difference of arrival and timestamp. It is 0 if this difference is
-        at most 1 s (``OTHER_CLOCK_S``), because the messages may only be delayed.
+        The value is the median of arrival time minus timestamp. A median of at most 1 s
+        (``OTHER_CLOCK_S``) can be a delay of the messages, so the value is then 0.
         """
         late_s = (self.arrived_s - self.stamp_s)[np.isfinite(self.stamp_s)]
         ahead_s = float(np.median(late_s)) if len(late_s) else 0.0
@@ -75,7 +75,7 @@ class Series:
 class Span:
     """A span of time.
 
-    ``what``: the state during this time; empty if the span does not belong to a state.
+    ``what``: the driver's state during this time; empty if the span does not stand for a state.
     """
 
     begin_s: float
@@ -160,7 +160,7 @@ class Log:
         return inside
 
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
-        """Return whether the driver's state explains a gap between messages of a topic.
+        """Return whether the driver's state explains why a topic has no messages in this period.
 
         ``running``: the states in which the driver publishes the topic.
         """

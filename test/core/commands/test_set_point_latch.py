@@ -26,9 +26,9 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """The commanding topic has changed, so a Stop and a command are due. The e-stop is latched.
+    """If the e-stop is latched while the commanding topic changes, only the e-stop is sent.
 
-    Neither the Stop nor the command is sent; only the e-stop is.
+    The change needs a Stop and the new topic's command. Neither of them is sent.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -39,10 +39,10 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """The e-stop is latched just after a command. It is sent at once, twice, and then repeated.
+    """The e-stop is sent without delay, twice at once, and then repeated without end.
 
-    It consists of ES (the board's own emergency stop) and Stop, because some firmware does not know
-    ES.
+    It is latched just after a command. It consists of ES (the board's own emergency stop) and Stop,
+    because some firmware does not know ES.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

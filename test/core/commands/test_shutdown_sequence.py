@@ -21,7 +21,11 @@ def bench() -> Bench:
 def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
-    """At shutdown, the driver writes Stop three times, then the letters for a pause or a reset."""
+    """At shutdown, the driver always writes Stop three times first.
+
+    Then it writes Stop and the letter for a pause or a reset, if the setting ``on_exit`` demands
+    one.
+    """
     assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
@@ -32,9 +36,10 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """At shutdown, the driver has sent P, but the pause is not confirmed yet.
+    """If a pause is under way at shutdown, the driver sends no second P.
 
-    It sends no second P, which would undo the first.
+    It has sent the first P, but the board has not confirmed the pause yet. A second P would resume
+    the board.
     """
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
@@ -50,7 +55,10 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """A paused board receives S just before the shutdown. The shutdown pauses the board again."""
+    """A shutdown pauses the board although a start was requested directly before.
+
+    The board is paused, and receives S (start). Then the driver shuts down with ``on_exit`` pause.
+    """
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -70,7 +78,7 @@ def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
 
 
 def left(bench: Bench) -> None:
-    """Begin the shutdown and wait until the robot is seen at rest, as the link does."""
+    """Begin the shutdown and wait until the robot is seen at rest, as ``Link.close`` does."""
     bench.session.shutdown.begin(bench.now)
     bench.settle()
     while not bench.session.shutdown.stands:
@@ -109,9 +117,10 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """At shutdown, a paused board sends no displacements, but its motors are off.
+    """At shutdown, the driver does not wait for a paused board to prove that the robot is at rest.
 
-    The driver takes the robot to be at rest without waiting.
+    A paused board sends no displacements that could prove it. But its motors are off, so the driver
+    takes the robot to be at rest.
     """
     bench = paused()
     left(bench)

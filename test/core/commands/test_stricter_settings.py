@@ -28,9 +28,9 @@ DRIVES = Bench.drive, (0.4,)
 def test_what_was_commanded_under_looser_ones_ends(
     command: Callable[..., None], values: tuple[float, ...], changed: dict[str, object]
 ) -> None:
-    """A limit or the timeout becomes stricter while the robot drives. The driver sends Stop.
+    """If a limit or the timeout becomes stricter while the robot drives, the driver sends Stop.
 
-    The next command is accepted.
+    It accepts the next command.
     """
     bench = driving()
     command(bench, *values)
@@ -57,9 +57,9 @@ def test_what_was_commanded_under_looser_ones_ends(
     ],
 )
 def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
-    """A limit or the timeout becomes looser, or the acceleration or the command rate changes.
+    """The robot drives on when a speed limit or the timeout becomes looser.
 
-    The robot drives on.
+    It also drives on when the acceleration or the command rate changes, or when nothing changes.
     """
     bench = driving()
     start = len(bench.written)
@@ -71,9 +71,9 @@ def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
 
 
 def test_a_robot_that_stands_is_told_nothing() -> None:
-    """A setting becomes stricter while the robot has no command or a zero command.
+    """A setting that becomes stricter causes no notice if the robot is not commanded to move.
 
-    No notice appears.
+    The robot has no command, or a zero command.
     """
     bench = driving()
     bench.drive()

@@ -21,7 +21,7 @@ TICK_S = 0.015
 def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
     """Command 1.5 rad while the wheel stays at ``angle_rad``.
 
-    Return the time of the fault, in s.
+    Return the time, in s, at which the follower reports the fault.
     """
     follower.aim(1.5)
     for n in range(200):
@@ -44,9 +44,9 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """The commanded angle changes while the wheel turns.
+    """A wheel that gets a new angle while it turns has the full time for the new angle.
 
-    The wheel has the full time for the new angle.
+    Until then, no fault is reported.
     """
     follower = Follower()
     follower.aim(1.5)
@@ -69,10 +69,10 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """The wheel is blocked, and motion is refused until the wheel has moved.
+    """After a fault of the front wheel, motion is refused until the wheel has moved.
 
-    Without the refusal, each new command would move the robot for 1 s, until the driver has noticed
-    the fault again.
+    Otherwise, each new command would move the robot for 1 s. The driver needs this time to notice
+    the blocked wheel again.
     """
     follower = Follower()
     at = blocked(follower, 0.0)
@@ -153,7 +153,7 @@ def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.Monke
 def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """During a turn on the spot, the wheel goes back from 90° to 82°. The turn continues."""
+    """A turn on the spot continues although the front wheel goes back from 90° to 82°."""
     bench = nominal()
     bench.drive_on(0.0, 0.5, seconds=2.0)
     monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)

@@ -69,10 +69,10 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """A lift voltage must wait, because another voltage was just sent.
+    """The time limit of a lift voltage begins when the voltage is sent, not when it is commanded.
 
-    The time limit of the waiting voltage begins when it is sent. If the lift is switched off during
-    the wait, the waiting voltage is discarded.
+    The voltage must wait if another voltage was just sent. If the lift is switched off meanwhile,
+    the driver discards the waiting voltage.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
@@ -91,11 +91,11 @@ def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
 
 
 def test_a_new_lift_voltage_is_not_cancelled_by_the_repeated_switching_off() -> None:
-    """Lift and brush are switched off. Soon after that, a new lift voltage is commanded.
+    """After a new lift voltage, the driver does not repeat the earlier line that stops the lift.
 
-    The line that switches the lift off is usually sent three times, and so is the one for the
-    brush. Here, the brush's line is still repeated. The lift's line is not, because it would cancel
-    the new voltage.
+    Lift and brush are switched off, then a new lift voltage is commanded. The driver usually sends
+    each of the two lines three times. Here it still repeats the brush's line, but not the lift's: a
+    repeated lift line would cancel the new voltage.
     """
     machine = Machine()
     machine.off()
@@ -188,9 +188,10 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 @pytest.mark.slow
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The watchdog process sends lines that stop wheels, brush and lift, with or without an e-stop.
+    """The last lines of the guard and of the driver stop wheels, brush and lift.
 
-    The lines that the driver sends at its exit stop them too.
+    The guard's lines do this with and without a latched e-stop. The driver's lines are those that
+    it sends at its exit.
     """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()

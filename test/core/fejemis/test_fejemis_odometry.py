@@ -92,9 +92,9 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:
-    """No pose arrives while the robot drives a curve for 2 s.
+    """A pose corrects the odometry after a gap of 2 s without poses.
 
-    The next pose corrects the odometry.
+    During the gap, the robot drives a curve.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
@@ -116,7 +116,7 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
     ],
 )
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
-    """A false pose arrives, and the odometry skips it.
+    """The odometry ignores a pose that is wrong by more than the robot can have moved.
 
     With the next correct pose, the odometry continues.
     """
@@ -131,7 +131,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """Another program sets the board's pose to zero (``enc0``). The odometry does not jump."""
+    """The odometry does not jump when another program sets the board's pose to zero (``enc0``)."""
     drive = Drive()
     drive.run(0.5, 0.2, 4.0)
     before = drive.out
@@ -145,10 +145,10 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
 
 @pytest.mark.slow
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
-    """In fifty drives, slip and wheel sizes are wrong by random amounts from the noise settings.
+    """The normalised squared error (NEES) of the odometry is about 3 on average over fifty drives.
 
-    The covariance is computed from the same settings, so the normalised squared error (NEES) is
-    about 3 on average.
+    In each drive, slip and wheel sizes have random errors. The noise settings are the standard
+    deviations of these errors, and the odometry computes its covariance from the same settings.
     """
     noise = OdometryNoise(wheels=WHEELS)
     squares = []
@@ -218,9 +218,9 @@ def figure_eight(bench: Bench, speed: float = 0.8, radius_m: float = 0.8) -> Non
 
 @pytest.mark.slow
 def test_a_figure_eight_with_losses_both_ways_ends_where_it_is() -> None:
-    """1 character in 1000 is lost, in both directions, while the robot drives 10 m.
+    """The odometry is right within 0.1 m and 2° after 10 m with losses in both directions.
 
-    The odometry is then right within 0.1 m and 2°.
+    1 character in 1000 is lost. The robot drives a figure eight.
     """
     chance = random.Random(1)
     bench = nominal(Simulated(seed=1, lose_inbound=1e-3))
@@ -236,10 +236,7 @@ def test_a_figure_eight_with_losses_both_ways_ends_where_it_is() -> None:
 
 @pytest.mark.slow
 def test_joint_states_follow_the_wheels() -> None:
-    """The robot drives a curve.
-
-    In the odometry, each wheel has rolled as far as the simulated wheel.
-    """
+    """The wheels in the odometry have rolled as far as those of the simulated robot in a curve."""
     bench = nominal()
     bench.drive_on(0.3, 0.3, 2.0)
     bench.run(1.0)

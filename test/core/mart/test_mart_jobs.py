@@ -41,7 +41,7 @@ def test_a_job_ends_with_the_reason_that_ended_it() -> None:
     bench = MartBench().ready()
     bench.hears = bench.speaks = False
     assert "no longer answers" in bench.job(Job.BIAS).message
-    for estop, reason in ((True, "e-stop was latched"), (False, "end the commands")):
+    for estop, reason in ((True, "e-stop was latched"), (False, "stop sending commands")):
         bench = MartBench().ready()
         bench.board.ask(Job.BIAS, "token", bench.now)
         bench.run(0.1)

@@ -101,10 +101,11 @@ def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None
 
 
 def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
-    """A copy of MCS, which switches the motors off, arrives 0.29 s late.
+    """The driver can start a motion although a late copy of MCS has blocked the server.
 
-    The server then refuses motions until MSM. A drive that is commanded in this time begins after
-    MSM.
+    MCS switches the motors off. Its copy arrives 0.29 s late, while the user commands a drive. The
+    server then refuses motions until it receives MSM. So the driver sends MSM, and the drive
+    begins.
     """
     bench = creeping()
     since = len(bench.written)
@@ -122,10 +123,11 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 
 
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
-    """The reply to MCS (direct control of the motors) is lost, so the driver repeats MCS.
+    """MSM ends the direct control of the motors for good, although a copy of MCS arrives late.
 
-    A copy of the second MCS is late. After MSM, which ends the direct control, this copy would
-    begin it anew. So the driver delays MSM until no copy can arrive.
+    The reply to MCS (direct control of the motors) is lost, so the driver repeats MCS. The network
+    delivers a late copy of the second MCS. After MSM, this copy would begin the direct control
+    again. So the driver sends MSM only when no copy can arrive any more.
     """
     bench = creeping()
     since = len(bench.written)
@@ -142,9 +144,9 @@ def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
 
 
 def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
-    """A controlled turn follows a straight move at once. The driver does not switch the motors off.
+    """The driver sends no MCS (switch off the motors) if a controlled turn follows a straight move.
 
-    The turn itself sets both motors, and leaves them off at its end.
+    The turn sets the speeds of both motors, and switches them off at its end.
     """
     bench = MartBench("source").ready()
     since = len(bench.written)
@@ -162,10 +164,10 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
 def test_a_motion_that_never_began_does_not_replace_a_switch_off(
     word: bytes, twist: tuple[float, float]
 ) -> None:
-    """After a straight move, a motor is still on. The start of the next motion is lost.
+    """If the start of a motion is lost, the driver still switches off a motor that is left on.
 
-    So this motion has not switched the motor off. After the user's stop, the driver switches it
-    off.
+    After a straight move, a motor is on. A motion that begins would set this motor anew, but the
+    server does not receive its start. After the user's stop, the driver switches the motor off.
     """
     bench = creeping()
     lost = drops(bench.robot.network[0].to_board, lambda data: data.startswith(word))
@@ -201,9 +203,10 @@ def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply:
 
 
 def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
-    """A late reply to another command seems to say that the server does not know MCS.
+    """The driver ends the direct control of the motors even if MCS seemed to be unknown.
 
-    But MCS has arrived, so the server refuses the next motion. The driver then sends MSM.
+    A late reply to another command says "not supported", and seems to be the reply to MCS. In fact,
+    the server has obeyed MCS, so it refuses the next motion. Then the driver sends MSM.
     """
     bench = creeping()
     network = bench.robot.network[0]
@@ -266,10 +269,10 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 
 
 def test_a_server_without_these_commands_is_asked_once() -> None:
-    """After a straight move, the driver sends MCS to switch off the motors.
+    """If a server does not know MCS (switch off the motors), the driver sends MCS only once.
 
-    A server that follows the manual does not support MCS. The driver sends it only after the first
-    of two moves.
+    The driver usually sends MCS after each straight move. A server that follows the manual does not
+    know it. Here, the robot makes two moves. MCS is sent only after the first.
     """
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):
@@ -294,10 +297,10 @@ def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None
 def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
     away_s: float,
 ) -> None:
-    """An earlier driver has left the motors under direct control (MCS). The new driver sends MSM.
+    """A new driver ends the direct control of the motors (MCS) that an earlier driver has left on.
 
-    Then the robot drives. This also works if the network is interrupted at first, so that the
-    driver uses the stop port.
+    It sends MSM, and then the robot drives. This also works if the network fails at first. In that
+    case, the new driver also uses the stop port.
     """
     bench = MartBench("source")
     bench.server.receive(BOTH[0], 0, None, 0.0)
@@ -332,11 +335,11 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 
 
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
-    """The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM.
+    """The driver does not take a second copy of the reply to MSM for the reply to RST IMU.
 
-    The server's reply ``ok`` to MSM arrives twice, and the driver's next RST IMU (check of the IMU)
-    is lost. The driver does not take the second ``ok`` for the reply to RST IMU. The driver's
-    notice says that the server still reports a motion although the robot is at rest.
+    The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM. The
+    server's reply ``ok`` to MSM arrives twice, and the driver's next RST IMU (check of the IMU) is
+    lost. The notice says that the server still reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

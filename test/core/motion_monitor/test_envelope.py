@@ -54,7 +54,11 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """The shortcut ``on_the_way`` accepts a twist. The full computation accepts it, too."""
+    """The full computation (``outside``) accepts every twist that ``on_the_way`` accepts.
+
+    ``on_the_way`` is a shortcut. With at most two set-points, it also accepts every twist close to
+    the line between them.
+    """
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
     motion = BodyTwist(
@@ -97,9 +101,9 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """A set-point is valid only for a single tick between two displacements.
+    """The envelope contains even a set-point that was valid only for a single tick.
 
-    The envelope still contains it.
+    The set-point begins and ends between two displacements.
     """
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
@@ -111,9 +115,9 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """Before the first set-point and shortly after it, the envelope is unknown: nothing is judged.
+    """The envelope is unknown until some time after the first set-point.
 
-    It is also unknown shortly after a goal pose.
+    It is also unknown for some time after a goal pose. While it is unknown, no motion is judged.
     """
     history = SetpointHistory()
     assert not history.known(0.0)
@@ -153,20 +157,17 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """A robot at rest has just been commanded to drive, and is still at rest.
-
-    It does not count as held.
-    """
+    """A robot that is still at rest just after a command to drive is not regarded as held."""
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """Motion is commanded, and a displacement over a period of 0.1 s is zero.
+    """One long displacement of zero does not prove that a robot is held, but two in a row do.
 
-    The robot may have reversed in this period. So only a second displacement of zero, directly
-    after the first, proves that the robot is held.
+    Motion is commanded. The displacement covers 0.1 s, in which the robot may have reversed its
+    direction.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -179,10 +180,10 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """A held robot is released and moves faster than commanded, to make up for the lost distance.
+    """The wind-up shrinks by the extra distance of a robot that drives faster than commanded.
 
-    The wind-up is the distance that the robot may still make up for. The extra distance of the fast
-    motion is subtracted from it, down to zero.
+    The wind-up is the distance that a robot has lost while it was held, and may still make up for.
+    It does not fall below zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

@@ -147,9 +147,9 @@ def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: f
 def test_nobody_is_told_anything_of_right_settings(
     frame: str, order: str, start: BoardPose
 ) -> None:
-    """All settings are right. The robot starts at the origin, close to it, or far away.
+    """The driver gives no advice if all settings are right.
 
-    There is no advice.
+    The robot starts at the origin, close to it, or far away.
     """
     board = BoardSettings(running=True, frame=frame, pose_byte_order=order, initial_pose=start)
     assert advice(board, OmniBotSettings(delta_frame=frame, pose_byte_order=order), 15.0) is None

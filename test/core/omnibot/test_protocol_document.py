@@ -142,7 +142,10 @@ def test_each_example_means_what_the_document_says(example: Example) -> None:
 
 
 def test_no_line_of_bytes_escapes_the_check() -> None:
-    """Each line in a code block that begins with bytes, or has an arrow, is a valid example."""
+    """Each line of a code block that looks like an example is a valid example.
+
+    A line looks like one if it begins with bytes, or if it has an arrow.
+    """
     suspects = re.compile(r"\s*[0-9A-Fa-f]{2}( [0-9A-Fa-f]{2})*(\s|$)|.*\s->\s")
     lines = [line for line in code_lines(DOCUMENT) if suspects.match(line)]
     assert [line for line in lines if not EXAMPLE.fullmatch(line)] == []
@@ -161,9 +164,9 @@ def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
 
 
 def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
-    """The remark of some examples is a motion in SI units.
+    """Examples with a motion in SI units are encoded by the driver to the bytes of the example.
 
-    If the driver encodes this motion, the result is the bytes of the example.
+    The motion is in the example's remark.
     """
     wishes = [
         (example, [float(part.split()[0]) for part in example.remark.split(",")])

@@ -69,9 +69,10 @@ def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: 
 
 
 def test_a_track_alone_is_refused() -> None:
-    """The user gives only ``track``. This is refused, because two commands need it.
+    """The driver refuses ``track`` without the other parameters of a command that contains it.
 
-    Both commands need further values, and the driver cannot know which command is meant.
+    Two commands contain ``track``, and each needs further values. The driver cannot know which
+    command the user wants.
     """
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)

@@ -25,7 +25,10 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """The line of one channel (front) loses all bytes. The line of the other (drive) loses none."""
+    """Each channel has the faults of its own line.
+
+    The line of the channel FRONT loses all bytes. The line of the channel DRIVE loses none.
+    """
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -51,9 +54,10 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """A network delays datagrams by up to 10 s of the board's simulated time.
+    """The delay of a datagram is measured in the board's simulated time, not in real time.
 
-    The test does not wait in real time. Each datagram arrives once, twice or never.
+    The network delays each datagram by up to 10 s. It loses some of them, and delivers others
+    twice.
     """
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
@@ -69,10 +73,10 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """The caller sends a datagram at 1000 s of its own clock. The network delays it by up to 1 s.
+    """A board gets the arrival time of a late datagram by the clock of the caller.
 
-    The board's clock shows another time. But the arrival time that the board gets with the datagram
-    is a time of the caller's clock.
+    The caller sends a datagram at 1000 s of its own clock. The network delays the datagram by up to
+    1 s. The board's own clock shows a different time.
     """
     at: list[float] = []
 

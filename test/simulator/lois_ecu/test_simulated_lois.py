@@ -105,9 +105,9 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @pytest.mark.parametrize("correction", [math.nan, math.inf, 1e30])
 def test_a_correction_beyond_all_numbers_ends_no_board(correction: float) -> None:
-    """A wheel's correction of its tick times is NaN, infinite or very large.
+    """The board survives a correction factor of NaN, infinity or 1e30 for a wheel's tick times.
 
-    The wheels turn, and the board continues to send.
+    The wheels still turn, and the board continues to send.
     """
     rig = Rig(DOCUMENTED).booted()
     rig.board.wheels[0].short_correction = correction
@@ -119,7 +119,7 @@ def test_a_correction_beyond_all_numbers_ends_no_board(correction: float) -> Non
 @pytest.mark.slow
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
-    """The button stops the robot. The board reports press and release.
+    """The button stops the robot, and the board reports when it is pressed and when it is released.
 
     A new set-point moves the robot even while the button is pressed.
     """
@@ -158,9 +158,9 @@ def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks
 
 @BOTH
 def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
-    """Checksums are switched off.
+    """After checksums are switched off, the board obeys only lines without a checksum.
 
-    The board rejects lines with a checksum, but its own lines still have one.
+    The lines that the board sends still have one.
     """
     rig = Rig(quirks)
     rig.run(2.1)
@@ -207,10 +207,7 @@ def test_a_carriage_return_makes_a_line_too_long(quirks: Quirks) -> None:
 
 @pytest.mark.parametrize("payload", [b"0000 +01", b"00000x01", b"0000-fff"])
 def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
-    """A payload has a space, a sign or a prefix.
-
-    The firmware accepts it, because ``strtol`` does.
-    """
+    """The firmware accepts a number with a space, a sign or a prefix, because ``strtol`` does."""
     rig = Rig(FIRMWARE)
     rig.run(2.1)
     text = b":03" + payload
@@ -236,10 +233,10 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 
 @pytest.mark.slow
 def test_the_gps_moves_with_the_robot() -> None:
-    """The robot drives, and stops more than 4 m from its start.
+    """The reported longitude agrees with the robot's x axis, which points east.
 
-    The reported longitude agrees with the robot's x, which points east. The longitude is a 32-bit
-    float, whose rounding error is less than 5 cm.
+    The robot drives more than 4 m and stops. The longitude is a 32-bit float. Its rounding error is
+    less than 5 cm, which is allowed.
     """
     rig = Rig(DOCUMENTED)
     rig.drive(20, 20, 20.0)
@@ -250,9 +247,10 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """The board reboots and is silent for 2 s. Then its tick counts are zero.
+    """After a reboot, the board is silent for 2 s and has lost all its state.
 
-    Its low-pass filter is not set, so it obeys no speed command. The robot's true pose stays.
+    Its tick counts are zero. Its low-pass filter is not set, so it obeys no speed command. Only the
+    robot's true pose is unchanged.
     """
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)
@@ -268,9 +266,9 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
 
 @pytest.mark.parametrize(("quirks", "unit_s"), [(DOCUMENTED, 1e-9), (FIRMWARE, 1e-3)])
 def test_a_reboot_restarts_the_clock(quirks: Quirks, unit_s: float) -> None:
-    """The board reboots after 3 s. The times in its reports of ticks then count from the reboot.
+    """A reboot resets the clock of the tick reports, but not the time of the GPS receiver.
 
-    The time of the GPS receiver is not reset.
+    The board reboots after 3 s.
     """
     rig = Rig(quirks, running=True)
     rig.run(3.0)
@@ -284,9 +282,9 @@ def test_a_reboot_restarts_the_clock(quirks: Quirks, unit_s: float) -> None:
 
 
 def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
-    """The board gives a ball and reboots. The LED is off, and another ball drops at once.
+    """A reboot switches the LED off, and the board can drop the next ball at once.
 
-    Without a reboot, the board refuses a second ball for 6 s.
+    Without a reboot, the board would refuse a second ball for 6 s.
     """
     rig = Rig().booted()
     rig.say(SetLed(True), DistributeBall())
@@ -298,7 +296,10 @@ def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> No
 
 
 def test_input_while_booting_is_kept_up_to_600_characters() -> None:
-    """700 characters arrive during the boot. The last 100 are lost, and the others are obeyed."""
+    """The board keeps the first 600 characters that arrive during the boot, and obeys them.
+
+    Here, 700 characters arrive. The last 100 are lost.
+    """
     rig = Rig()
     rig.board.receive(encode_command(LOW_PASS) * 50)
     rig.run(2.3)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the simulated receivers. Commands are hexadecimal texts, and some are damaged."""
+"""Tests of the simulated receivers.
+
+The tests write commands as hexadecimal numbers. Some commands are damaged.
+"""
 
 import pytest
 from hypothesis import given
@@ -99,7 +102,7 @@ def test_letters_act_between_control_frames_and_not_within() -> None:
 
 
 def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
-    """On some boards, a letter within a frame acts at once. The frame is still completed."""
+    """On some boards, a letter within a frame acts at once, and the board still obeys the frame."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50", kind=LETTERS_ANYWHERE) == [
         START,
         PAUSE,
@@ -137,9 +140,9 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A stop frame lacks a byte. The counting receiver takes the next frame's first FF instead.
+    """A counting receiver completes a stop frame that lacks a byte with the next frame's first FF.
 
-    The last word of the stop frame becomes 255, so wheel C turns at 255 LSB.
+    So the last word of the stop frame is 255, and wheel C turns at 255 LSB.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
@@ -147,9 +150,9 @@ def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> No
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
-    """A stop frame has lost a byte, and the letter P follows.
+    """A counting receiver takes the letter P for the missing last byte of a stop frame.
 
-    The receiver reads P as a speed of wheel C, not as a pause.
+    So it obeys P as a speed of wheel C, not as a pause.
     """
     assert understood("FF FE 02 00 00 00 00 00", "50") == [ControlFrame(0x02, (0, 0, 80))]
 
@@ -177,9 +180,10 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A stop frame lacks a byte. The window receiver takes the next frame's first FF instead.
+    """A window receiver obeys a stop frame that lacks a byte, and also the complete frame after it.
 
-    It uses the same FF again as the beginning of the next frame. So it finds both frames.
+    The receiver needs nine bytes, so it takes the first FF of the second frame as the ninth byte of
+    the first. It also uses this FF as the beginning of the second frame.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
@@ -188,9 +192,9 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """A word of a frame has the value -2, so its bytes are FF FE, like a header.
+    """A window receiver finds a second frame in the middle of a frame that contains FF FE.
 
-    The window receiver finds a second frame there.
+    A word of the first frame has the value -2, so its bytes are FF FE, like a header.
     """
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
@@ -244,9 +248,9 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """The board needs three bytes to wake up, and two come during its boot.
+    """Some receivers count the bytes that arrive during the boot as wake-up bytes, others do not.
 
-    Whether these two count depends on the receiver.
+    The board needs three bytes to wake up. Two of them arrive during the boot.
     """
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
