@@ -98,8 +98,9 @@ class Keeper:
 
         * ``stopped``: whether the robot is already stopped. If not, the guard first sends its stop
           command.
-        * ``written``: whether the driver has written its last packets. If not, the guard discards
-          the output that waits in the kernel, because this may be old motion commands.
+        * ``written``: whether the driver could write its last packets to the port. If not, old
+          motion
+         commands may still wait in the kernel's output, so the guard discards this output.
         """
         self._restart_at = math.inf
         if stopped:

@@ -35,8 +35,11 @@ STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
 driver waits longer."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest. It replaces the shorter
-``STANDS_WITHIN_S`` if no guard process can repeat Stop afterwards."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest, if there is no guard.
+
+A guard process could repeat Stop after the shutdown. With a guard, the driver waits only for
+``STANDS_WITHIN_S``.
+"""
 SILENCE_S: Final = 0.25
 """Longest wait for the second proof at shutdown that the robot is at rest, in s.
 
@@ -127,7 +130,8 @@ class Link:
     ) -> None:
         """Pass a motion command on: call ``action`` with the session, ``wish`` and the time.
 
-        ``wish``: the motion that the sender wants. ``SharedSession.command`` has the details.
+        ``wish``: the motion that the sender of the command wants. ``SharedSession.command`` has the
+        details.
         """
         self._shared.command(action, wish, sent_ns, moves_base=moves_base)
 

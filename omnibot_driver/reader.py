@@ -164,7 +164,7 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Let the session react to received bytes, for example by a command to the board.
+        """Let the session process received bytes. The result can be a command to the board.
 
         The measurements in these bytes are already delivered. The caller holds the lock.
         """

@@ -22,9 +22,9 @@ def adapter(root: Path, device: str, latency: str) -> Path:
 
 
 def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
-    """The adapter has FTDI's default latency timer.
+    """For an adapter with FTDI's default latency timer, the message names two remedies.
 
-    The message has a permanent and a temporary remedy.
+    One remedy is permanent, the other is temporary.
     """
     text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
     assert "16 ms" in text
@@ -45,7 +45,7 @@ def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("latency", ["1\n", "5\n", "", "soon\n"])
 def test_a_short_timer_or_one_that_says_nothing_is_left_alone(tmp_path: Path, latency: str) -> None:
-    """The latency timer is short, or its value is unreadable. The check gives no message."""
+    """The check gives no message if the latency timer is short, or if its value is unreadable."""
     assert selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", latency)) == ""
 
 
@@ -104,9 +104,10 @@ def test_a_prefix_without_its_slash_is_told_of_with_the_remedy(prefix: str) -> N
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """The driver warns that measurements wait for /clock, which is not published.
+    """With simulated time, the driver warns if /clock is not published.
 
-    There is no warning for a replay, because a recording has its own stamps.
+    Measurements would wait for /clock. In a replay, they do not wait, because a recording has its
+    own stamps. So there is no warning.
     """
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
@@ -122,9 +123,9 @@ def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, wa
 def test_a_node_of_the_same_full_name_is_told_of(
     others: list[tuple[str, str]], warned: bool
 ) -> None:
-    """Another node with the same full name is reported.
+    """The driver reports another node if its full name is the same.
 
-    A node with the same name in another namespace is not reported.
+    It does not report a node that has the same name in another namespace.
     """
     publishers = [
         SimpleNamespace(node_namespace=namespace, node_name=name)
@@ -175,9 +176,9 @@ SECTION = "{name}:\n  ros__parameters:\n    max_linear_speed: 0.1\n"
 def test_a_parameter_file_for_another_node_is_told_of(
     tmp_path: Path, content: str, read: bool
 ) -> None:
-    """A parameter file may name other nodes only. ROS then ignores it without a message.
+    """The driver reports a parameter file that names only other nodes.
 
-    The driver's message names the file and the node.
+    ROS ignores such a file without a message. The driver's message names the file and the node.
     """
     file = tmp_path / "robot.yaml"
     file.write_text(content)

@@ -78,10 +78,9 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The estimated delay of a command never exceeds the true delay.
+    """The estimated delay never exceeds the true delay, so a command in time is never refused.
 
-    So a command that is in time is never refused, however much the clocks differ. The delay
-    consists of the time in the network and in the driver's queue.
+    The delay consists of the time in the network and in the driver's queue.
     """
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
@@ -115,10 +114,9 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """A command that has waited in the driver's own queue for too long is refused.
+    """A command that has waited too long in the driver's own queue is refused, even a first one.
 
-    This applies even to the first command of a sender. The driver measures the wait by its own
-    clock, so it need not know the sender's clock.
+    The driver measures this wait by its own clock, so it need not know the sender's clock.
     """
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
@@ -147,7 +145,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """The sender's clock is set back, so its commands seem late. They are soon accepted again."""
+    """Commands seem late after the sender's clock was set back, but are soon accepted again."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1
@@ -232,8 +230,7 @@ def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
 ) -> None:
     """Late commands of two senders on one host are refused, although one sender was silent before.
 
-    The host's clock drifts during this silence. Then the network fails for a while, and delivers a
-    late command of each sender.
+    The host's clock drifts during this silence. A late command of each sender comes after it.
     """
     receiver, silent, busy = Receiver(), Sender(), Sender(sent=1000)
     receiver.hear(busy, 99.0, 0.01)
@@ -249,9 +246,9 @@ def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
 
 
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
-    """A sender sends a single command, like ``ros2 topic pub --once``. The driver accepts it.
+    """The driver accepts the only command of a sender, such as ``ros2 topic pub --once``.
 
-    The driver also accepts it if the sender's clock is behind.
+    This also applies if the sender's clock is behind.
     """
     receiver = Receiver()
     for number in range(20):
@@ -262,10 +259,7 @@ def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
 
 @given(st.floats(-1e-4, 1e-4))
 def test_clocks_that_drift_are_followed(drift: float) -> None:
-    """No command is refused while the two clocks drift apart for ten hours.
-
-    From time to time, the sender sends nothing for an hour.
-    """
+    """No command is refused while the clocks drift for ten hours. Some silences last an hour."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(200):
         now_s += HOUR_S if number % 20 == 0 else 0.1
@@ -274,7 +268,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
-    """A refusal says how old the command is, and names the network or this computer's load."""
+    """A refusal says how old the command is, and if the network or this computer is the cause."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
         Delay(1.2, 0.1).require("cmd_vel", 0.5)
     with pytest.raises(CommandRefused, match=r"waited 1\.1 s in this driver's queue.* load"):
@@ -285,9 +279,8 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """After a sender's late first message, the driver finds two possible times for the next one.
 
-    The first message is 0.5 s late, so the sender's clock seems to be 0.5 s behind. One of the two
-    times is the time by the sender's clock, corrected by 0.5 s. The other is not corrected. Here,
-    the sender's clock is right, so the second time is the true one.
+    The first is the time by the sender's clock plus 0.5 s, the delay of the first message. The
+    second is the time by the sender's clock. Here, this clock is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -299,8 +292,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """After ten messages of a sender, the driver finds only one possible time of sending.
 
-    The sender's clock is an hour behind the driver's. The driver knows this difference by then, and
-    the time that it finds is correct.
+    The time is right although the sender's clock is an hour behind. The driver knows this by then.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

@@ -99,9 +99,9 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 47), (DELTA, 159), (POSE, 255)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The session needs at most ``bound`` calls per tick, from the bytes to its events.
+    """The session needs at most ``bound`` calls to turn the bytes of a tick into events.
 
-    The link's calls for output and wake-up are included.
+    The number includes the calls with which the link asks for packets and for the next wake-up.
     """
     session = opened_session()
 
@@ -150,7 +150,10 @@ def test_a_command_calls_no_more_than_it_did() -> None:
 
 
 def test_a_serialised_tick_calls_no_more_than_it_did() -> None:
-    """The serializer needs few calls for an Imu, and for an Odometry with its JointState."""
+    """The serializer makes an Imu in at most 2 calls.
+
+    It makes an Odometry with its JointState in at most 8 calls.
+    """
     settings = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))
     make, before = Serializer(settings), unturned(settings.wheels)
     imu = ImuEstimate(0.0, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0))

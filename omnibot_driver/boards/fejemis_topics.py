@@ -37,8 +37,10 @@ from omnibot_driver.qos import DEEP
 NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
-"""Shortest time between two published steering angles, in ns. The board sends 66 angles per second.
-If an angle comes earlier, the driver does not publish it."""
+"""Shortest time between two published steering angles, in ns.
+
+The board sends 66 angles per second. The driver does not publish an angle that comes earlier.
+"""
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")
 SERVICES: Final = {
@@ -53,7 +55,7 @@ SERVICES: Final = {
 class FejemisTopics:
     """The topics and services that only a Fejemis has.
 
-    ``publish``: for each type of reading, the method that publishes it.
+    ``publish``: a mapping from each type of reading to the method that publishes it.
     """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
@@ -215,7 +217,7 @@ class FejemisTopics:
     def _lift(self, link: Any) -> Callable[..., None]:
         """Return the callback of ``lift_cmd``.
 
-        The callback obeys a command of 0 V in any state of the boards, however old the command is.
+        It obeys a command of 0 V in any state of the boards, even if the command is old.
         """
 
         def lift(session: Session, message: Float32, now: float) -> None:

@@ -44,10 +44,11 @@ class BoardFigures:
 
     * ``rates_hz``: expected rate of each kind of reading.
     * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
-    * ``faults``: number of framing faults, at which bytes belong to no frame.
-    * ``discarded_bytes``: bytes that belong to no valid frame.
-    * ``saturated``: commands that exceeded the range of the board's encoding.
-    * ``odom_hz``: rate of the topic ``odom``; None: published once per odometry reading.
+    * ``faults``: number of framing faults. At a framing fault, bytes belong to no frame.
+    * ``discarded_bytes``: number of bytes that belong to no valid frame.
+    * ``saturated``: number of commands that exceeded the range of the board's encoding.
+    * ``odom_hz``: rate of the topic ``odom``. If None, one message is published per odometry
+      reading.
     * ``own``: figures that only this kind of board has, by label, e.g. its version.
     """
 
@@ -68,16 +69,14 @@ class ReadingClock(Protocol):
         """Rate error of the board's clock, in ppm. It is positive if the clock is too fast."""
 
     def restart(self) -> None:
-        """Forget all earlier readings, because a new stream of readings begins."""
+        """Forget all earlier readings, because the next reading begins a new stream."""
 
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
         """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
-        ``now``: arrival time of the readings' last bytes.
-
-        ``edge``: value of ``Board.edge`` after that call.
+        ``now``: the time that was passed to this call. ``edge``: ``Board.edge`` after it.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
@@ -99,8 +98,8 @@ class Board(Protocol):
     """Capabilities of this kind of board."""
 
     settings: Any
-    """Settings of this board that its data does not show. The driver can replace them at any time.
-    """
+    """Settings of this board that its data does not show. The driver can replace this object at any
+    time."""
 
     clock: ReadingClock | None = None
     """Clock for readings that carry the board's time.
@@ -249,8 +248,8 @@ class Board(Protocol):
     def pause(self) -> Packets:
         """Return the packets that pause a running board.
 
-        On some boards, the pause command resumes a paused board. There, raise RequestRefused unless
-        the board is known to run.
+        On some boards, the same command resumes a paused board. For such a board, this method
+        raises RequestRefused unless the board is known to run.
         """
         return NO_PACKETS
 

@@ -43,7 +43,7 @@ RESET_WITHIN_S: Final = 9.5
 
 
 class Phase(Enum):
-    """The state of the exchange with the board. Motion is accepted only in SETTLED."""
+    """How far a change of the board's mode has come. Motion is accepted only in SETTLED."""
 
     CLOSED = "not connected"
     SETTLED = "settled"
@@ -70,10 +70,10 @@ They save time, because Python 3.11 looks up Enum members slowly.
 
 
 class ModeManager:
-    """The mode that was requested from a board, and the exchange with the board to reach it.
+    """The mode that was requested from a board, and the packets and data that lead to this mode.
 
     * ``run``: whether to start the board at each connection. If False, the board keeps its mode.
-    * ``answers``: the answers that the session has not taken yet.
+    * ``answers``: the answers to requests that the session has not passed on yet.
     """
 
     def __init__(self, board: Board, *, run: bool) -> None:
@@ -98,7 +98,7 @@ class ModeManager:
         self._deadline = math.inf
 
     def take_output(self) -> Packets:
-        """Return the packets to write before any others, and regard them as written."""
+        """Return the packets to write before any others. From then on, they count as written."""
         packets, self.output = self.output, NO_PACKETS
         return packets
 
@@ -210,7 +210,8 @@ class ModeManager:
     def heard_reset(self, now: float, remark: str = "") -> None:
         """Record that the board has obeyed a reset.
 
-        ``remark``: what is not proved about the reset, as a sentence; empty if all is proved.
+        ``remark``: a sentence that says what is not proved about the reset; empty if all is proved.
+        It becomes the answer to the request.
         """
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()
@@ -252,7 +253,8 @@ class ModeManager:
     def tick(self, now: float) -> None:
         """Do what is due at ``now``, which is at most one of three things.
 
-        Report a pause as confirmed, let a request fail whose time is over, or send a start again.
+        Report a pause as confirmed, end a request as failed because its time is over, or send a
+        start again.
         """
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
@@ -280,7 +282,7 @@ class ModeManager:
         return NO_PACKETS
 
     def _begin(self, now: float) -> None:
-        """Wake the board, and start it if it should run and can be started."""
+        """Wake the board. Also start it if it should run and if it can be started."""
         self.output += self._board.wake()
         self.phase = Phase.SETTLED
         if self._wanted is Wanted.RUNNING and Request.START in self._board.traits.requests:

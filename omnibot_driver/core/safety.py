@@ -6,8 +6,8 @@
 * The board restarts, is paused, falls silent, or reports that the robot must be stopped.
 * This process was stalled.
 
-The command policy and the motion monitor stop the robot for other reasons. This module does not
-know bytes, or who commands the robot.
+For all other reasons, the command policy or the motion monitor stops the robot. This module does
+not know bytes, or who commands the robot.
 """
 
 from typing import Final

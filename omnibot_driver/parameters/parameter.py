@@ -88,7 +88,7 @@ class Parameter:
     def check(self, value: object) -> Value:
         """Return the value in the parameter's own type, such as 1.0 for the integer 1.
 
-        Raises ParameterError if the value is wrong.
+        Raises ParameterError if the parameter cannot have this value.
         """
         if self.unset and value in (None, DUMPED_UNSET):
             return None
@@ -144,9 +144,9 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """Return an integer as a float, or a whole float as an integer, if ``kind`` requires it.
+    """Convert an integer to a float, or a whole float to an integer, if ``kind`` requires it.
 
-    Other values are returned unchanged.
+    A whole float is one without a fraction, such as 2.0. Other values are returned unchanged.
     """
     if kind is float and type(value) is int:
         return float(value)

@@ -23,7 +23,7 @@ def bench(request: pytest.FixtureRequest) -> AnyBench:
 
 
 def test_every_board_of_the_driver_is_among_them() -> None:
-    """Every board of the driver must be in ``MAKERS``, because only those boards are tested."""
+    """``MAKERS`` has every board of the driver. Only the boards in ``MAKERS`` are tested here."""
     missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
     assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
@@ -63,9 +63,9 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 @pytest.mark.slow
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """The user sends fifty commands at 20 Hz.
+    """All commands are accepted, even if odometry arrives rarely.
 
-    All are accepted, even if odometry arrives rarely.
+    The user sends fifty commands at 20 Hz.
     """
     for _ in range(50):
         bench.drive(0.2)
@@ -254,9 +254,9 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 @pytest.mark.slow
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench) -> None:
-    """The line is cut at random moments while the robot drives, reverses and rests.
+    """The odometry stays finite and plausible although the line is cut at random moments.
 
-    The odometry stays finite and plausible.
+    The robot drives, reverses and rests meanwhile.
     """
     random = Random(1)
     for vx in (0.3, -0.2, 0.0, -0.2):

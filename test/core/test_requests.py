@@ -25,7 +25,10 @@ def bench() -> Bench:
 def test_on_a_silent_board_every_request_is_answered_in_time(
     request_: Request, limit_s: float
 ) -> None:
-    """The board is silent. Each request fails in time, and the answer says what to check."""
+    """If the board is silent, each request fails within its time limit.
+
+    The answer says what to check.
+    """
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -57,7 +60,7 @@ def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
 
 
 def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
-    """The driver shuts down during a request. The request fails, and its answer says why."""
+    """A request that is under way at shutdown fails, and its answer says why."""
     bench.speaks = False
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.shutdown.begin(bench.now)

@@ -74,7 +74,7 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Add another result. Rows with the same name are combined into one row."""
+        """Add the result of another row. Rows with the same name are combined into one row."""
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:
@@ -118,7 +118,7 @@ class Campaign(Outcome):
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
         """Run a case once. Add its result to ``row``, and collect what went wrong.
 
-        ``again``: whether the robot must obey a fresh command afterwards.
+        ``again``: whether the robot must obey a new command after the case.
         """
         try:
             case(rig)
@@ -288,9 +288,9 @@ def losses() -> list[Piece]:
 
 
 def pieces() -> list[Piece]:
-    """Return all pieces of the campaign except the busy computer, in the order of the table.
+    """Return all pieces of the campaign in the order of the table, except ``busy_computer``.
 
-    The test on a busy computer must run alone.
+    That piece must run alone.
     """
     return [
         ("faults_of_the_line", ()),

@@ -32,7 +32,7 @@ test_driver_endings and test_driver_guard test other endings.
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The driver ends during a drive. The board receives Stop last, and the exit code is right."""
+    """After an end during a drive, the board has received Stop last, and the exit code is right."""
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
         assert not rig.findings.take(), rig.driver.output
@@ -41,9 +41,9 @@ def test_the_robot_stands_still_however_the_driver_ends(
 def test_a_terminal_that_is_closed_ends_the_driver_in_order(
     tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The driver's terminal is closed, so the driver gets SIGHUP and cannot print.
+    """If the driver's terminal is closed, the driver still stops the robot and exits with code 0.
 
-    It still stops the robot and exits with code 0.
+    The driver gets SIGHUP, and can no longer print.
     """
 
     def run(rig: Rig, end: Ending) -> None:

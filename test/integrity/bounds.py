@@ -86,7 +86,8 @@ BOUNDS: dict[str, Bound] = dict(
 )
 """The limits for each fault.
 
-The limits for added bytes apply only to chunkings that deliver several frames at once.
+For the fault in which bytes are added to the stream, there are limits only for chunkings that
+deliver several frames at once.
 """
 
 Scores = dict[tuple[str, str, str], Score]

@@ -22,9 +22,9 @@ too, the first decoded frame is wrong: by chance, it equals a true frame that wa
 If the read has no next decoded frame, the judge accepts the first one.
 """
 REACH_BYTES = 600
-"""Number of received bytes before a read at which the search for its true frames begins.
+"""The search for the true frames of a read begins this number of received bytes before it.
 
-The search begins a further 300 bytes earlier in the true stream.
+In the true stream, it begins another 300 bytes earlier.
 """
 
 
@@ -106,9 +106,9 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
 
 
 def _place(received: Received, key: Key, at: int, horizon: int) -> int:
-    """Return the index of the next true frame with this content, up to the byte ``horizon``.
+    """Return the index of the next true frame that equals the decoded frame ``key``.
 
-    If no such frame is found, return the number of frames.
+    The search ends at the byte ``horizon``. If it finds no frame, return the number of frames.
     """
     frames = received.truth.frames
     while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:

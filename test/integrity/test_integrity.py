@@ -43,7 +43,7 @@ def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, score
 
 
 def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
-    """The stream is undamaged. Even the plain parser makes no error, and the judge reports none."""
+    """If the stream is undamaged, even the plain parser makes no error. The judge reports none."""
     truth = generate(SCENARIOS["driving"], 1, 10.0)
     received = receive(truth, lambda length, _: list(range(length)), Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

@@ -129,7 +129,7 @@ def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
 
 
 def test_colcon_installs_the_executables(prefix: Path) -> None:
-    """``ros2 run`` offers the executables in lib/omnibot_driver, which has no other files."""
+    """lib/omnibot_driver contains the executables that ``ros2 run`` offers, and no other files."""
     files = list((prefix / "lib" / PACKAGE).iterdir())
     executables = {"calibrate", "demo", "driver", "monitor", "report", "simulator"}
     assert {file.name for file in files} == executables
@@ -168,9 +168,9 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 
 
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
-    """``colcon test`` runs the tests, because setup.py names pytest.
+    """``colcon test`` runs the tests, because the package's setup.py names pytest.
 
-    Without this name, colcon would run no tests.
+    If setup.py did not name pytest, colcon would run no tests.
     """
     one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]

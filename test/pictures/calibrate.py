@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of ``calibrate imu``, ``scale`` and ``geometry``, made with robots with known errors.
+"""Pictures of ``calibrate imu``, ``scale`` and ``geometry``.
 
-docs/tools/calibrate.md lists these errors, and the errors that the calibration finds.
+The simulated robots have known errors. docs/tools/calibrate.md lists these errors beside the errors
+that the calibrations measure.
 """
 
 import math

@@ -119,7 +119,10 @@ class Solid:
 
 
 def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArray[np.intp]:
-    """Return the indices of all rays that can meet a sphere, and of some that just miss it."""
+    """Return the indices of the rays that can meet a sphere.
+
+    The result can contain a few rays that narrowly miss it.
+    """
     to = centre - origins
     along = np.einsum("ij,ij->i", to, directions)
     passing = np.einsum("ij,ij->i", to, to) - along**2 < reach**2
@@ -140,7 +143,7 @@ class Link:
 
 
 def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple[Solid, Hits]]:
-    """Yield each solid, and where the rays enter and leave it."""
+    """Yield each solid that rays meet, and the places where the rays enter and leave it."""
     for link in links:
         rays = close(link.centre, link.reach, origins, directions)
         for solid in link.solids:

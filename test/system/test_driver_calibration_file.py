@@ -41,9 +41,9 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
 
 
 def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:
-    """One log line names the parameters that the calibration file sets.
+    """One log line names the parameters that the driver takes from the calibration file.
 
-    The line omits the notes that the tools have added to the file.
+    The tools also write notes about the calibration into this file. The log line omits them.
     """
     path = tmp_path / "robot.yaml"
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")

@@ -31,7 +31,7 @@ from omnibot_driver.tools.calibrate.robot import Robot
 Answer = Callable[[str], str]
 
 BUSY_S = 3.0
-"""Timeout of commands and data, in s. It is longer than most delays of a busy test machine."""
+"""Timeout of commands and data in s, so long that a busy test machine seldom exceeds it."""
 ATTEMPTS = 5
 STALLED = "driver stalled for"
 OVERLOADED = ("did not run for", "not overloaded")

@@ -162,9 +162,9 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
 
 
 def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
-    """The robot is commanded, but does not move. The tool reports this.
+    """The tool reports that the robot does not move although it is commanded.
 
-    The test sets a scale of one count per m/s, so that every command is rounded to zero.
+    The test sets ``linear_scale`` to 1 LSB per m/s, so every command is rounded to zero.
     """
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):
@@ -247,10 +247,10 @@ def test_parameters_are_restored_after_an_interruption(robot: Robot, rigged: Rig
 
 
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """A defect in the tool interrupts a motion.
+    """If a bug interrupts a motion, the tool still switches the motion monitor on again.
 
-    The tool switches the driver's motion monitor on again. Otherwise the monitor would stay off
-    until the driver restarts.
+    The bug is in the tool. Without this, the driver's monitor would stay off until the driver
+    restarts.
     """
 
     def fail() -> None:
@@ -265,9 +265,10 @@ def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> Non
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     robot: Robot, rigged: Rig
 ) -> None:
-    """The user suspends the tool during a motion, so the driver stops the robot.
+    """A tool that was suspended during a motion moves nothing when it resumes.
 
-    When the tool resumes, it sends only zero commands and ends with an error.
+    The driver has stopped the robot meanwhile. The tool sends only zero commands and ends with an
+    error.
     """
     clock = SimpleNamespace(monotonic=time.monotonic)
 
@@ -321,7 +322,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A topic without data for 0.3 s is reported as silent.
+    """The tool reports a topic as silent if it has no data for 0.3 s.
 
     Only the topics that a motion needs are checked.
     """

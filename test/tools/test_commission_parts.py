@@ -197,9 +197,10 @@ def test_a_sensor_mounted_askew_stays_so() -> None:
 def test_a_side_lowered_instead_of_raised_is_a_contradiction(
     nose_rad: float, left_rad: float
 ) -> None:
-    """The user lowers the nose or the left side instead of raising it.
+    """A tilt in the wrong direction is a contradiction.
 
-    The measured axes would be left-handed, so this is a contradiction.
+    The user lowers the nose or the left side instead of raising it. The axes that are computed from
+    this would be left-handed.
     """
     level, nose_up, left_up = postures(rotation(math.pi, 0, 0), nose_rad, left_rad)
     with pytest.raises(Contradiction, match="repeat both tilts"):

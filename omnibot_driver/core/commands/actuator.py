@@ -2,9 +2,9 @@
 
 """The interface between the command policy and a board's encoding of motion.
 
-The policy decides what the robot should do; an actuator makes the packets. Some actuators repeat
-set-points (`set_point_stream.py`). An actuator reads no clock, and never refuses the policy's
-orders.
+The command policy decides what the robot should do; an actuator makes the packets for it. On some
+boards, the actuator sends each set-point repeatedly (`set_point_stream.py`). An actuator reads no
+clock, and never refuses what the command policy orders.
 """
 
 from typing import Protocol
@@ -30,8 +30,8 @@ class Actuator(Protocol):
     def commanded(self) -> BodyTwist | None:
         """Body velocity of the last command that was sent, in the board's axes.
 
-        It is the velocity after the board's encoding has rounded it. None if the command does not
-        determine a velocity, such as a goal.
+        It is the velocity after the board's encoding has rounded it. None after a command that
+        determines no velocity, such as a goal.
         """
 
     @property
@@ -51,7 +51,7 @@ class Actuator(Protocol):
         """Send ``wanted`` from now on, in place of the previous order."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that packets of a request, such as a start, were sent. They command no motion."""
+        """Record that packets of a request (e.g. a start) were sent. They command no motion."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now, possibly none. From then on, they count as written."""

@@ -44,7 +44,7 @@ class MotionInterlock:
         self._tripped_at = self._commanded_at = -math.inf
 
     def trip(self, now: float) -> None:
-        """Refuse motion, because the robot was stopped for not moving as commanded."""
+        """Refuse motion, because the monitor has stopped a robot that did not move as commanded."""
         again = now - self._tripped_at <= AGAIN_S or self.until is self._for_good
         self.until = self._for_good if again else Until.RELEASE
         self.trips += 1
@@ -84,11 +84,11 @@ class MotionInterlock:
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        ``stands``: whether the command is to stand still, which is always allowed.
+        ``stands``: whether the command is to stand still. Such a command is always allowed.
 
-        ``timeout_s``: time without commands, in s, after which motion is allowed again, if the
-        motion monitor has stopped the robot once. After a second stop within 60 s, this time does
-        not help.
+        ``timeout_s``: time in s. After a first stop by the motion monitor, motion is allowed again
+        when no command has arrived for this time. After a second stop within 60 s, motion remains
+        refused.
         """
         reason = "" if stands else self.reason(now, timeout_s)
         if not stands:

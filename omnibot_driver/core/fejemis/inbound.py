@@ -50,7 +50,7 @@ class Inbound:
         self.begin()
 
     def begin(self) -> None:
-        """Begin new connections: forget the mode, the angle to relay, and all timeouts."""
+        """Begin new connections: forget the mode, ``relay_rad``, and all timeouts."""
         self.mode = Mode.UNKNOWN
         self.relay_rad: float | None = None
         self._front_unheard = True
@@ -58,9 +58,9 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return the front wheel's new angle in rad, which must be relayed to the drive board.
+        """Return the front wheel's new angle in rad, and forget it. The driver must relay it.
 
-        None if no angle has arrived since the last call.
+        The drive board needs this angle. None if no angle has arrived since the last call.
         """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad

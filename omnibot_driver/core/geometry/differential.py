@@ -23,7 +23,7 @@ class DifferentialKinematics:
 
     @property
     def rims(self) -> "DifferentialKinematics":
-        """The same geometry with wheels of 1 m radius, so wheel rates are rim speeds in m/s."""
+        """The same robot with wheels of 1 m radius. Its wheel rates equal the rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

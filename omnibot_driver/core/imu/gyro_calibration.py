@@ -23,8 +23,9 @@ GAP_S: Final = 0.2
 ANSWER_WITHIN_S: Final = 4.0
 """Time in s within which a request is answered.
 
-A call of ``~/calibrate_gyro`` can take at most five seconds. The time that remains is for writing
-the result to a file."""
+A call of ``~/calibrate_gyro`` can take at most five seconds. The driver needs the rest of this time
+to write the result to a file.
+"""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3

@@ -51,8 +51,8 @@ UNFORESEEN: Final = 5.0
 """Limit, in standard deviations, of the difference between a reported and an expected count. A
 larger difference cannot be a motion of the wheel: the counter may have restarted."""
 SAME_TICKS: Final = 0.6
-"""Least difference, in ticks, between the reported and the expected count at which an unchanged
-count corrects the filter. With a smaller difference, the next tick may not be due yet."""
+"""An unchanged count corrects the filter only if the expected count differs from it by at least
+this number of ticks. With a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): limits of the difference
@@ -62,8 +62,8 @@ DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""Standard deviation in m of a wheel's distance after the wheel has rolled 1 m without counted
-ticks: ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
+"""Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks:
+``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's x, and of its y, after a wheel has rolled 1 m at an
 oscillating speed. The error of the wheel's own distance (``SWINGING_M``) is separate."""
@@ -95,7 +95,7 @@ class Comparison:
         self._motion = motion
         self._counted_m = [0.0, 0.0]
         self._counted = [False, False]
-        """For each wheel: whether the board counted its ticks at the time of the last report."""
+        """For each wheel: whether the board was counting its ticks when the last report arrived."""
         self._turned_m = 0.0
         self._speeds = ReportedSpeed(motion, 0), ReportedSpeed(motion, 1)
 

@@ -105,9 +105,9 @@ class RestingWheel:
         self._lately.append((self._clock_s, rpm))
 
     def tell(self, rpm: float, since_s: float, *, tuned: bool = False) -> None:
-        """Process a reported speed, without its sign.
+        """Process a speed of the wheel that the board has reported, without its sign.
 
-        ``since_s``: time since the last reported speed.
+        ``since_s``: time since the previous report of the speed.
 
         ``tuned``: whether the user set the controller's gains.
         """

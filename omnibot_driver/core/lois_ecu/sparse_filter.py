@@ -42,7 +42,7 @@ class SparseFilter:
                 row[j] += variance * a * b
 
     def forget(self, state: int, mean: float, variance: float) -> None:
-        """Set a state to the given mean and variance, independent of all other states."""
+        """Set a state to the given mean and variance, uncorrelated with all other states."""
         covariance = self.covariance
         for row in covariance:
             row[state] = 0.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Capabilities of a LOIS ECU, and advice on what to check when its robot does not obey."""
+"""Capabilities of a LOIS ECU, and advice on what to check when the robot does not obey."""
 
 from typing import Final
 

@@ -103,7 +103,7 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """Record that the server may be gone, because it did not answer ``word``.
+        """Record that the server may be gone, because it did not answer the query ``word``.
 
         The driver sends HELLO until the server answers with its name.
         """

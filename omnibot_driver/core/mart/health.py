@@ -42,7 +42,7 @@ ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """Largest difference between two readings that are regarded as equal, in V (VOLTS) or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of equal readings in a row that are needed if a reply may belong to another query."""
+"""Number of readings in a row that must be equal if a reply may be that to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
@@ -126,20 +126,20 @@ class Health:
     def _is_of_another(self, word: Word, inches: float) -> bool:
         """Return whether the distance is probably the reply to another query.
 
-        This is assumed for 0 inches, and for a distance that equals the other sonar's last reading.
+        It probably is if it is 0 inches, or if it equals the last reading of the other sonar.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
 
     def is_voltage(self, number: float) -> bool:
-        """Return whether ``number`` is one of the last reported battery voltages, in V."""
+        """Return whether ``number`` is a battery voltage, in V, that was reported recently."""
         return any(abs(number - volts) < SAME_V for volts in self._voltages)
 
     def _status(self, bits: int) -> None:
         """Record the status of the motor board.
 
-        A status other than 0 must come twice in a row, because a late encoder count can look like a
-        status.
+        The late reply to a query of the encoder count can look like a status. So a status other
+        than 0 is believed only if it comes twice in a row.
         """
         if not 0 <= bits <= NO_READ:
             return
@@ -184,7 +184,7 @@ class Health:
         self._encoder_fails += 1
 
     def encoder_answers(self) -> None:
-        """Record that the query of the encoder count (ENC) was answered by a count."""
+        """Record that the server answered the query of the encoder count (ENC) with a count."""
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
@@ -225,7 +225,7 @@ class Health:
     def bits(self) -> str:
         """The faults that the motor board reports (MCSTAT), as text.
 
-        The text is "none" without faults, and "unknown" before the first status.
+        The text is "none" if there are no faults. Before the first status, it is "unknown".
         """
         if self.status is None:
             return "unknown"

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The check that the IMU works (RST IMU, or MCR SLOW 0), and its last results.
+"""The check that the IMU works, and the results of the last checks.
 
-After a failed RST IMU, the server does not use the IMU until a later RST IMU succeeds. So the
-driver repeats the command. This module knows replies and times; it does not know which motion is
-started. The caller passes the time.
+The driver checks the IMU with the command RST IMU, or with MCR SLOW 0. After a failed RST IMU, the
+server does not use the IMU until a later RST IMU succeeds. So the driver repeats the command. This
+module knows replies and times; it does not know which motion is started. The caller passes the
+time.
 """
 
 import math
@@ -26,7 +27,8 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, its result is regarded as older: by half of the additional time.
+If a check takes longer, the driver assumes that half of the additional time passed after the IMU
+was checked. So the result is older by this time.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""

@@ -40,11 +40,11 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 STOPS_S: Final = 1.0
-"""Time in s within which a stop is usually answered."""
+"""Time in s within which the server usually answers a stop."""
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
-"""Time in s from the server's first reply to the first query of the battery voltage (VOLTS).
+"""Time in s between the server's first reply and the first query of the battery voltage (VOLTS).
 
-The server was silent before this reply, and may have been restarted. The driver needs the voltage
+Before this reply, the server was silent, and may have been restarted. The driver needs the voltage
 before the first motion, which begins after STARTS_UP_S.
 """
 VOLTS_S: Final = 10.0
@@ -77,8 +77,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A motion command or a stop cancels the current job. There is one exception: if a goal is
-        repeated after its turn, the download of the turn's record continues.
+        A motion command or a stop cancels the current job. There is one exception: if ``wanted`` is
+        the present goal again, the download of a turn's record continues.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):

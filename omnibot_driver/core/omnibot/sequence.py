@@ -3,7 +3,8 @@
 """The counters of the board's deltas and poses. They show lost deltas and a restart of the board.
 
 The counter SEQ of the deltas has one byte and wraps every 10.24 s at 25 Hz. The arrival times show
-how often it has wrapped. Poses have a counter of their own, which shows lost deltas sooner.
+how often it has wrapped. Poses have a counter of their own. It can show lost deltas before the next
+delta arrives.
 
 Input: counters and arrival times; this module does not know what a frame contains.
 """
@@ -94,7 +95,8 @@ class Sequence:
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """Return what the counter of a new delta shows about lost deltas and about a restart.
 
-        ``now``: arrival time in s. ``imus``: IMU frames since the previous delta.
+        ``now``: arrival time of the delta in s. ``imus``: number of IMU frames since the previous
+        delta.
         """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose

@@ -20,8 +20,8 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-In this time, the smallest delay of an adapter occurs: if the adapter's timer is 100 ppm off, its
-delays repeat every 20 s.
+This is long enough to contain the smallest delay of an adapter: if the period of the adapter's
+timer is wrong by 100 ppm, its delays repeat every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
@@ -37,7 +37,7 @@ FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
 late ones cannot be recognized."""
 LATE_PART: Final = 0.1
-"""Largest fraction of the reads that is assumed to be late.
+"""The fit assumes that at most this fraction of the reads is late.
 
 A read is late if its delay exceeds ``LATE_S``, in s.
 """
@@ -54,7 +54,7 @@ Point = tuple[int, float]
 
 
 class ClockFit:
-    """The fitted clock, which gives the time of each tick, from the first tick seen on.
+    """The fitted clock. It gives the time of each tick, from the first tick that was read.
 
     * ``slope_s``: the fitted period of the ticks in s. ``period_s``: the nominal period.
     """

@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 class Odometry:
-    """The board's own pose in its earth frame, and the motion that is not sent yet."""
+    """The board's own pose in its earth frame, and the motion that the board has not sent yet."""
 
     _body_unsent: tuple[float, float, float]
     _counts_unsent: Triple

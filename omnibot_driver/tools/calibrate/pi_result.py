@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""New gains are regarded as worse if a step's error with them exceeds the previous one by this
-factor."""
+"""New gains are regarded as worse if the error of a step grows by more than this factor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,9 +87,9 @@ class WheelTuned:
 def result_of(
     wheels: Sequence[WheelTuned], goals: Goals, parameters: Mapping[str, float]
 ) -> Result:
-    """Return the result, to show and to save.
+    """Return the result, which the tool shows and saves.
 
-    ``parameters``: the values that the tool has set in the driver, and saves in the file.
+    ``parameters``: parameters that the tool has set in the driver. It also saves them in the file.
     """
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],

@@ -60,7 +60,9 @@ the next would not decay.
 class Goals:
     """The goals of a tuning, for the response to a step of the set-point.
 
-    ``overshoot``, ``band``: largest overshoot and final deviation, as fractions of the speed.
+    ``overshoot``: largest overshoot, as a fraction of the speed.
+
+    ``band``: largest deviation from the final speed once a step has settled, as a fraction of it.
 
     ``destination``: set-point, as a fraction of the speed at full duty.
 
@@ -204,7 +206,7 @@ def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
 
 
 def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
-    """Return the response that a board would record from these positions of a wheel.
+    """Return the response that a board would record while a wheel turns through these positions.
 
     ``ticks``: positions in ticks, one for each ms.
     """

@@ -67,7 +67,7 @@ class Rest:
 
     @property
     def level_sigma_rad(self) -> float:
-        """Standard deviation of roll and pitch, in rad, that comes from the noise alone."""
+        """Standard deviation of roll and pitch in rad, due to the noise alone."""
         return float(self.force_sigma.max() / self.gravity_mps2)
 
 
@@ -143,7 +143,10 @@ def still(bias_radps: Column) -> Callable[[Log], None]:
 
 
 def _within(readings: Column, size: int) -> Column:
-    """Return the standard deviation of readings within blocks of ``size`` readings, by axis."""
+    """Return the standard deviation of readings from the mean of their block, for each axis.
+
+    Each block has ``size`` readings.
+    """
     blocks = _blocks(readings, size)
     return np.asarray(np.sqrt(blocks.var(axis=1, ddof=1).mean(axis=0)))
 

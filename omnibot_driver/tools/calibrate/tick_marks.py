@@ -31,8 +31,8 @@ The unit is the standard deviation, which is estimated from the median size of a
 EXPLAINED: Final = 0.4
 """Fitted marks are accepted only if they explain at least this fraction of the variance.
 
-If the marks are evenly spaced, fitted marks explain less than 0.2. This was found with three
-records of two turns each.
+If the marks of an encoder are evenly spaced, fitted marks explain less than 0.2. This value comes
+from a test with three records of two turns each.
 """
 
 

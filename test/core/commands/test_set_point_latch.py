@@ -82,7 +82,7 @@ def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
 
 
 def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stream) -> None:
-    """After the release of the e-stop, the driver sends only Stop. The old command is forgotten."""
+    """After the release of the e-stop, the driver sends only Stop, not the command from before."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.1)

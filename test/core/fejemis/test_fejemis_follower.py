@@ -116,10 +116,10 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
+    """The driver stops a robot whose firmware limits the front wheel to 90° in reverse.
 
-    The driver stops the robot, and a notice names ``allow_reverse``. The sender repeats its
-    command, so the driver stops the robot a second time. Motion is then refused until ~/start.
+    Such a robot turns instead of reversing. A notice names ``allow_reverse``. The sender repeats
+    its command, so the driver stops the robot a second time. Motion is then refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)

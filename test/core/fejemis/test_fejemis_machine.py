@@ -46,9 +46,9 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """A thousand lift voltages and colours are commanded within 1 s. Twenty of each are sent.
+    """If a thousand lift voltages or colours are commanded within 1 s, only about twenty are sent.
 
-    A voltage of 0 is sent at once.
+    The newest of them is among these. A voltage of 0 is sent at once.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -124,10 +124,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 @pytest.mark.slow
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
-    """An event such as an e-stop or a restart stops brush and lift.
-
-    They stay off when the robot works again.
-    """
+    """An event such as an e-stop or a restart stops brush and lift. They stay off afterwards."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
@@ -163,7 +160,7 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
 
 
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
-    """A command expires, and only the wheels stop.
+    """When a motion command expires, only the wheels stop.
 
     The brush stays on, because a robot may sweep at rest.
     """

@@ -25,7 +25,7 @@ TRACK_M = 0.4
 
 
 def told(place: Pose, time_s: float) -> BoardPose:
-    """Return the drive board's pose message, rounded as the board prints it."""
+    """Return the message with the drive board's pose, rounded as the board prints it."""
     return BoardPose(
         round(time_s, 5), round(place.x_m, 3), round(place.y_m, 3), round(place.yaw_rad, 4), 3
     )
@@ -204,7 +204,7 @@ def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
 
 
 def figure_eight(bench: Bench, speed: float = 0.8, radius_m: float = 0.8) -> None:
-    """Drive a figure eight of ten metres. A refused command does not end the drive."""
+    """Drive a figure eight, 10 m long. If a command is refused, continue with the next one."""
     rate = speed / radius_m
     lap_s = math.tau / rate
     end_s, began = 2 * lap_s, bench.now

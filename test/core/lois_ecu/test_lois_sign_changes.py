@@ -45,7 +45,10 @@ def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own
 def test_a_wheel_that_has_settled_is_not_doubted(
     settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sign change of the set-points adds variance only if it comes soon after another one."""
+    """A sign change of the set-points adds variance only if it comes soon after another one.
+
+    The variance is that of the yaw.
+    """
     soon, late = variance(settings, 0.6), variance(settings, 7.0)
     monkeypatch.setattr(motion_filter, "UNSETTLED_S", (0.0, 0.0))
     assert soon > 1.02 * variance(settings, 0.6)

@@ -181,9 +181,10 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
 
 @pytest.mark.parametrize("reply", [b"", b"fail", b"fail improper command format", b"unknown"])
 def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply: bytes) -> None:
-    """A server answers MCS and MSM by a text of its own, or not at all.
+    """If a server gives no valid answer to MCS and MSM, the driver still starts motions.
 
-    The driver tries a few times, reports once that there is no answer, and then starts motions.
+    The server answers with a text of its own, or not at all. The driver tries a few times, and
+    reports once that there is no answer.
     """
     bench = MartBench("documented")
     network = bench.robot.network[0]
@@ -258,9 +259,9 @@ def test_a_motor_is_switched_off_with_a_dead_imu() -> None:
 
 
 def test_a_docking_move_is_followed_by_a_switch_off() -> None:
-    """A docking move is straight and may also leave a motor on.
+    """After a docking move, the driver switches the motors off (MCS, MSM).
 
-    The driver switches the motors off (MCS, MSM).
+    A docking move is a straight move, and can leave a motor on.
     """
     bench = MartBench("source", dock_m=0.4).ready()
     bench.job(Job.DOCK, "DOCK", 12)

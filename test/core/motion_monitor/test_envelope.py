@@ -87,7 +87,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """A set-point is replaced. In the envelope, it loses weight from 0.3 s to 1.1 s afterwards."""
+    """A set-point that was replaced loses its weight in the envelope from 0.3 s to 1.1 s later."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)

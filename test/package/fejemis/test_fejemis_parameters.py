@@ -27,10 +27,10 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """The user gives parameters. The driver writes them in the units of the boards.
+    """The driver writes the user's parameters to the boards in the boards' units.
 
-    The command ``confw`` gets radii, gear, ticks and track; ``confs`` gets track and steering
-    distance; ``fwoffset`` gets an angle in degrees.
+    The command ``confw`` writes radii, gear, ticks and track; ``confs`` writes track and steering
+    distance; ``fwoffset`` writes an angle in degrees.
     """
     values = check(
         wheel_radii=[0.08, 0.081],

@@ -12,10 +12,7 @@ from omnibot_driver.simulator.common.wired import WiredBoard
 
 
 def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
-    """A command comes in two pieces, with data of another channel in between.
-
-    The board obeys it.
-    """
+    """The board obeys a command in two pieces with data of another channel in between."""
     wired = WiredBoard(ToyLines())
     wired.receive(b"go 0.", 0.0, DRIVE)
     wired.receive(b"angle 30\n", 0.0, FRONT)
@@ -92,9 +89,9 @@ def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
 
 
 def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
-    """A program gives one line for two channels, or a line of the wrong kind.
+    """A program that gives a board the wrong lines for its channels gets a ValueError.
 
-    ValueError is raised.
+    It gives one line for two channels, or one line of the wrong kind.
     """
     for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
         with pytest.raises(ValueError, match="do not match"):

@@ -61,7 +61,7 @@ def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
 
 @pytest.mark.slow
 def test_periods_stretch_with_the_load() -> None:
-    """On the public firmware, a message with a period of 400 ms comes only every 422 ms."""
+    """The public firmware sends a message with a period of 400 ms only every 422 ms."""
     rig = Rig()
     rig.run(3.0)
     assert len(ticks_in(rig.run(42.2))) in range(98, 103)
@@ -179,10 +179,7 @@ def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
 
 @BOTH
 def test_junk_before_a_colon_is_harmless(quirks: Quirks) -> None:
-    """Other characters come before a colon.
-
-    The colon begins a new line, so the command is obeyed.
-    """
+    """Characters between two commands are harmless: a colon begins a new line."""
     rig = Rig(quirks)
     rig.run(2.1)
     for line in (b"\xffx:030000000138\n", b":19000000003200:190000000032\n"):
@@ -235,8 +232,8 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 def test_the_gps_moves_with_the_robot() -> None:
     """The reported longitude agrees with the robot's x axis, which points east.
 
-    The robot drives more than 4 m and stops. The longitude is a 32-bit float. Its rounding error is
-    less than 5 cm, which is allowed.
+    The robot drives more than 4 m and stops. The test allows an error of 5 cm, because the
+    longitude is a 32-bit float and therefore rounded.
     """
     rig = Rig(DOCUMENTED)
     rig.drive(20, 20, 20.0)

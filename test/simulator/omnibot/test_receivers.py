@@ -93,7 +93,10 @@ def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
 
 
 def test_letters_act_between_control_frames_and_not_within() -> None:
-    """A frame contains P, R and S, and is read as one frame. Only the letters around it act."""
+    """A frame that contains the letters P, R and S is read as one frame.
+
+    Only letters before and after the frame act.
+    """
     assert understood("53 FF FE 01 00 50 00 52 00 53 50") == [
         START,
         ControlFrame(0x01, (0x50, 0x52, 0x53)),
@@ -140,7 +143,7 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A counting receiver completes a stop frame that lacks a byte with the next frame's first FF.
+    """If a stop frame lacks a byte, a counting receiver takes the next frame's first FF for it.
 
     So the last word of the stop frame is 255, and wheel C turns at 255 LSB.
     """
@@ -213,7 +216,7 @@ def test_a_frame_without_its_header_acts_by_its_letters() -> None:
 
 
 def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
-    """The first byte of the header FF FE comes twice. Most receivers still find the frame."""
+    """Most receivers find the frame even if the first byte of its header FF FE comes twice."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         typed = "FF FF FE 02 00 20 00 00 00 00"
         assert understood(typed, kind=kind) == [ControlFrame(0x02, (32, 0, 0))]
@@ -239,9 +242,9 @@ def test_the_first_three_bytes_after_power_up_are_swallowed(kind: ReceiverKind) 
 
 @every_kind
 def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> None:
-    """A motion frame wakes the board.
+    """A motion frame that wakes the board loses its first three bytes.
 
-    Its first three bytes are lost, and the rest is read as letters.
+    The board reads the remaining bytes as letters.
     """
     assert understood("FF FE 01 00 52 00 00 00 00", kind=kind, awake=False) == [RESET]
 
