@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver process: it starts the node, waits for the end, and returns an exit code.
+"""The driver process: it starts the node, waits for a reason to end, and returns an exit code.
 
 This module knows signals and the executor; it does not know what the node does.
 """
@@ -202,7 +202,7 @@ def _run(ending: Ending, args: list[str]) -> None:
 
 
 def _set_deadline() -> None:
-    """End the process if the shutdown takes longer than 5 s (``LONGEST_END_S``).
+    """End the process by force if the shutdown takes longer than 5 s (``LONGEST_END_S``).
 
     The guard process then stops the robot.
     """

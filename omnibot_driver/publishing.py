@@ -33,13 +33,13 @@ from omnibot_driver.qos import LATCHED
 from omnibot_driver.transforms import transform_publisher
 
 RAW_DEPTH: Final = 1000
-"""Queue depth of the topics with raw bytes. A recorder that is delayed for seconds still gets every
-byte."""
+"""Queue depth of the topics with raw bytes. The queue is long, so that a recorder that is delayed
+for seconds still gets every byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Limit of a simulated clock, in ns. From this time on, the driver does not publish measurements. A
-stamp may be later than the clock, so the limit is a minute before the latest time that a stamp can
-express."""
+"""Limit of a simulated clock, in ns. From this time on, the driver does not publish measurements.
+The limit is a minute before the latest time that a stamp can express, because a stamp may be later
+than the clock."""
 
 
 class Publishing:
@@ -102,7 +102,7 @@ class Publishing:
 
     @property
     def settings(self) -> messages.MessageSettings:
-        """What messages contain besides measurements, such as names of coordinate frames."""
+        """Settings of the messages, such as the names of coordinate frames."""
         return self._settings
 
     @settings.setter
@@ -142,7 +142,7 @@ class Publishing:
             self._handlers[type(event)](event, clock_offset_ns)
 
     def publish_state(self) -> None:
-        """Publish the state for the first time, before any event."""
+        """Publish the first state, before an event changes it."""
         self._show(StateChanged(*self._session.shown))
 
     def report_port(self, trouble: str | None) -> None:
@@ -162,8 +162,9 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock.
 
-        While this clock is 0 or outside the range of ROS time, only events without a stamp, such as
-        answers to requests, are published. The clock may also jump back.
+        While this clock is 0 or outside the range of ROS time, only events without a stamp are
+        published, such as answers to requests. After the clock has jumped back, the stamps begin
+        again at its new time.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -185,19 +186,19 @@ class Publishing:
     def _end(self) -> None:
         """Record that ROS is shutting down, so that later events are not published.
 
-        ROS calls this method. To ask ROS at each event would take too much time.
+        ROS calls this method. It would take too much time to ask ROS for each event.
         """
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Record whether the node's time is simulated, after ROS has changed this.
+        """Record whether the node's time is simulated. ROS calls this method when this changes.
 
-        ROS calls this method. To ask ROS at each event would take a microsecond more.
+        It would take a microsecond more for each event to ask ROS.
         """
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
-        """Return a function that publishes packets. Each channel has a topic of its own."""
+        """Return a function that publishes packets, those of each channel on a separate topic."""
         publishers = [
             self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
             for name in self._channels
@@ -250,10 +251,10 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text is new since the last change of state, and remember the text.
+        """Return whether this text is new since the last change of state. Remember the text.
 
-        Changes to disconnected or connecting are not counted. So if a port is lost repeatedly, and
-        the board sends no valid data in between, each text is logged only once.
+        A change to disconnected or connecting does not count as a change. So each text is logged
+        only once if a port is lost repeatedly and the board sends no valid data in between.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

@@ -41,7 +41,7 @@ WAITING = ("faults", "system", "tools")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let parallel workers begin with the longest files, then alternate between two kinds of files.
+    """Order the test files for parallel workers: the longest first, then two kinds by turns.
 
     The tests in files of one kind wait in real time, and those in files of the other kind compute.
     If many waiting tests ran at once, their drivers would get too little processor time.
@@ -66,7 +66,7 @@ def pytest_report_header() -> str:
 
 @pytest.fixture
 def nothing_left_behind() -> Iterator[None]:
-    """Check that every link, port and board of a test releases its threads and descriptors."""
+    """Check that the links, ports and boards of a test leave no thread and no descriptor behind."""
     threads, descriptors = driver_threads(), os.listdir("/proc/self/fd")
     yield
     for thread in threading.enumerate():

@@ -50,7 +50,7 @@ def imported(path: Path) -> set[str]:
     ids=lambda path: str(path.relative_to(PACKAGE)),
 )
 def test_common_code_imports_no_board(path: Path) -> None:
-    """No common code, such as session, link and node, imports a module of a particular board."""
+    """Common code, such as session, link and node, imports no module of a particular board."""
     known = {
         f"omnibot_driver.{place}.{name}" for place in ("core", "boards") for name in boards.PROFILES
     }
@@ -59,7 +59,7 @@ def test_common_code_imports_no_board(path: Path) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
-    """Every profile makes its board from the default parameters.
+    """Every profile can make its board with the default values of the parameters.
 
     The board's kinematics has one joint for each of its wheels.
     """
@@ -109,9 +109,9 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
-    """A board has the parameter ``baudrate`` exactly if its messages mention a baud rate.
+    """A board has the parameter ``baudrate`` if its ``traits.baudrate`` is true, and only then.
 
-    The board's ``traits.baudrate`` is then true.
+    This trait means that the board's messages mention a baud rate.
     """
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))
@@ -137,10 +137,11 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
-    """The description of ``gyro_bias`` says that ``~/calibrate_gyro`` measures this bias.
+    """The parameter descriptions say about an IMU only what is true for the board.
 
-    If the board itself subtracts the bias, the description must not say this. The noise of an IMU
-    is quoted only in the parameter table of the OmniBot.
+    ``~/calibrate_gyro`` measures ``gyro_bias``, and the description of ``gyro_bias`` says so. If
+    the board itself subtracts the bias, the description must not say this. The noise of an IMU is
+    quoted only in the parameter table of the OmniBot.
     """
     profile = boards.load(name)
     traits = profile.make(boards.check_all({"board": name})).traits
@@ -214,7 +215,7 @@ def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
 
 
 def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
-    """The core's code for reading parameters works for a board that lacks most of them."""
+    """The core's functions that read parameters work for a board that lacks most of them."""
     values = table("few", FEW).check_all({})
     settings = session_settings(values, OmniKinematics(0.029, 0.143))
     assert settings.limits.wheel_radps == 0.0

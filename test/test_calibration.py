@@ -27,7 +27,7 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
 
 
 def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
-    """A missing or empty file contains no calibration. A save also makes the file's folder."""
+    """A file that is missing or empty contains no calibration. A save makes its folder."""
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})

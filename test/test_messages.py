@@ -39,7 +39,7 @@ def test_a_stamp_is_seconds_and_nanoseconds() -> None:
 
 @pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
 def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
-    """The age of a stamp is negative when the stamp is in the future."""
+    """The age of a stamp is the time since the stamp. It is negative for a stamp in the future."""
     assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
 
 
@@ -75,7 +75,7 @@ def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
 
 @pytest.mark.parametrize("frame", ["", "odom"])
 def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
-    """A goal with an empty frame is in the odometry frame."""
+    """A goal with an empty frame is accepted. It counts as a goal in the odometry frame."""
     assert messages.goal_pose(goal(1.0, frame=frame), "odom") == Pose(1.0, 0.0, 0.0)
 
 
@@ -161,7 +161,7 @@ def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> Non
 def test_an_imu_message_has_no_orientation() -> None:
     """The orientation's covariance begins with -1, which means "unknown" by REP-145.
 
-    Specific force and angular rate are those of the estimate, unchanged.
+    Specific force and angular rate are copied unchanged from the estimate.
     """
     estimate = ImuEstimate(0.0, (1.0, 2.0, -9.8), (0.1, 0.2, 0.3))
     message = messages.imu_message(estimate, STAMP, SETTINGS)
@@ -265,7 +265,7 @@ def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
 
 @pytest.mark.parametrize("axis", ["linear.x", "linear.z", "angular.x", "angular.y", "angular.z"])
 def test_a_twist_that_is_not_finite_anywhere_is_refused_as_it_came(axis: str) -> None:
-    """A twist that is not finite is refused with the numbers of all six axes."""
+    """If an axis of a twist is not finite, the twist is refused with the numbers of all axes."""
     twist = Twist()
     part, name = axis.split(".")
     twist.linear.y = 0.25

@@ -78,10 +78,10 @@ class LoisEcuTopics:
         self._make_what_the_modes_need()
 
     def _make_what_the_modes_need(self) -> None:
-        """Create the topics that the current modes need; remove ``duty_cmd`` outside of duty mode.
+        """Create and remove topics, as the parameters ``drive_mode`` and ``terminal_mode`` require.
 
-        The modes are the parameters ``drive_mode`` and ``terminal_mode``. This method must be
-        called on the executor's thread.
+        ``duty_cmd`` exists only in duty mode. ``~/terminal`` is created in a terminal mode, and
+        then stays. This method must be called on the executor's thread.
         """
         duty, terminal = (
             self._values["drive_mode"] == "duty",

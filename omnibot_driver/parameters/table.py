@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of one board's parameters: the common ones that the board can use, and its own.
+"""All parameters of one board: common ones that the board can use, and its own ones.
 
 This module does not use ROS, and does not name any board.
 """
@@ -83,8 +83,8 @@ DISPENSABLE: Final = frozenset(
 """Common parameters that a board may omit. A board must have all other common parameters that fit
 its traits, because the driver reads them."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""Values of the parameter ``on_exit`` except stop. A board offers such a value only if it supports
-the request that belongs to the value."""
+"""Values of the parameter ``on_exit`` besides ``stop``, each with its request. A board offers a
+value only if it supports this request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +186,7 @@ def table(
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return the one of ``names`` that is most similar to ``name``."""
+    """Return the name in ``names`` that is most similar to ``name``."""
     import difflib  # only needed for a wrong name, so rarely
 
     return difflib.get_close_matches(name, list(names), n=1, cutoff=0.0)[0]
@@ -207,7 +207,7 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
 def _require_ranges(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if a range sensor's smallest distance is not below its largest one.
 
-    If the parameter with ``_maximum`` does not exist, the parameter with ``_minimum`` is accepted.
+    A parameter with ``_minimum`` is accepted without a check if there is none with ``_maximum``.
     """
     for least in (name for name in values if name.endswith("_minimum")):
         most = f"{least.removesuffix('minimum')}maximum"

@@ -27,7 +27,7 @@ from sensor_msgs.msg import Imu, JointState
 
 
 def main() -> None:
-    """Subscribe to all measurements of every namespace."""
+    """Record the measurements of every namespace until stdin is closed, then print their times."""
     namespaces = sys.argv[1:]
     rclpy.init()
     node = Node("ear", start_parameter_services=False, enable_rosout=False)

@@ -29,17 +29,20 @@ from ratios import Figure, table
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
-"""For each board except the OmniBot, the module that measures its driver."""
+"""For each board except the OmniBot: the module that measures the driver with this board."""
 SCALES = (1, 2, 4, 8)
 
 
 def say(what: str) -> None:
-    """Print what is measured now."""
+    """Print which measurement begins now."""
     print(f"... {what}", file=sys.stderr, flush=True)
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return the comparisons of the driver with the floor, and further sections of the report."""
+    """Return comparisons of the driver with the floor, and further sections of the report.
+
+    The floor is the smallest program with the same output as the driver.
+    """
     windows = 2 if quick else 6
     figures: list[Figure] = []
     for adapter in ADAPTERS:

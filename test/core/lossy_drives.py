@@ -14,9 +14,10 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""``ROUNDING_M``, ``ROUNDING_RAD``: largest errors of odometry from the rounding of deltas.
+"""Largest errors of odometry that come from the rounding of deltas: ``ROUNDING_M`` in m,
+``ROUNDING_RAD`` in rad.
 
-They grow until the next pose of the board corrects them.
+The errors grow with each delta, until the next pose of the board corrects them.
 """
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
@@ -30,7 +31,7 @@ def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "ear
 
 
 def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose frames for ``seconds``: those with the given headers, or all if no headers are given."""
+    """Lose all frames with these headers for ``seconds``. Without headers, lose every frame."""
     on.loses = lambda data, _now: not headers or data[:2] in headers
     on.run(seconds)
     on.loses = loses_nothing
@@ -42,7 +43,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Return the time in s and the motion between each estimate and the next one."""
+    """Return the time in s and the motion from each estimate to the next one."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)
@@ -50,7 +51,7 @@ def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
 
 
 def attached(settings_: OdometrySettings | None = None) -> Odometry:
-    """Return odometry that has received its board's pose (0, 0, 0) twice, and so accepted it."""
+    """Return odometry that has received the board's pose (0, 0, 0) twice and has accepted it."""
     odometry = Odometry(settings_ or OdometrySettings())
     odometry.settle(PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.0, 0.0, 0.0))

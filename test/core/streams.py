@@ -2,7 +2,7 @@
 
 """Byte streams of the simulated board, and functions that divide them into frames or decode them.
 
-A stream is divided by the manual's tables, and decoded by the driver's decoder.
+The manual's tables divide a stream into frames. The driver's decoder decodes it.
 """
 
 import struct
@@ -29,12 +29,12 @@ def velocity(x: int, y: int, omega: int) -> bytes:
 
 
 def record(board: SimulatedBoard, seconds: float) -> list[bytes]:
-    """Return what the board sends in each tick."""
+    """Run the board for ``seconds``. Return what it sends in each tick."""
     return [board.step() for _ in range(round(seconds * 100))]
 
 
 def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
-    """Drive with a new random velocity every 0.5 s. Return what the board sends in each tick."""
+    """Drive the board with a new random velocity every 0.5 s. Return what it sends in each tick."""
     random, ticks = Random(7), []
     for _ in range(round(seconds * 2)):
         board.receive(velocity(*(random.randint(-24, 24) for _ in range(2)), random.randint(-9, 9)))
@@ -43,7 +43,7 @@ def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
 
 
 def life(board: SimulatedBoard) -> list[bytes]:
-    """Return what the board sends in each tick while it passes through all its modes."""
+    """Let the board pass through all its modes. Return what it sends in each tick."""
     ticks = record(board, 2.6)
     board.receive(bytes(8) + b"S")
     ticks += drive(board, 2.0)
@@ -111,7 +111,7 @@ def decoded(chunks: Iterable[bytes], *, step_s: float = TICK_S) -> list[Frame]:
 
 
 def byte_by_byte(ticks: Sequence[bytes]) -> list[Frame]:
-    """Decode the bytes one by one, at the pace of 115200 baud."""
+    """Decode the bytes one by one, at the pace of 115200 baud. Return the frames."""
     made, found = FrameDecoder(), []
     for number, tick in enumerate(ticks):
         for place in range(len(tick)):

@@ -23,8 +23,8 @@ def bench() -> Bench:
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
     """The user pauses a driving robot. The driver sends Stop, and then P once.
 
-    P is sent when new data shows that the board runs. The «Paused» text of the board confirms the
-    pause.
+    It sends P only after new data has shown that the board runs. The «Paused» text of the board
+    confirms the pause.
     """
     bench.drive(0.5)
     bench.run(0.3)
@@ -85,9 +85,9 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 ) -> None:
     """Another program pauses the board while older data is still on its way to the driver.
 
-    The user requests a pause. The older data makes the driver send P, which resumes the board. Then
-    the «Paused» text of the first pause arrives late. It does not confirm the driver's pause, so
-    the driver sends P again.
+    The user requests a pause, too. Because of the older data, the driver sends P, which resumes the
+    board. Then the «Paused» text about the other program's pause arrives. The driver does not take
+    it for a confirmation, and sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")
@@ -109,9 +109,10 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """A paused board is started, and then a pause is requested.
+    """The user starts a paused board, and then requests a pause.
 
-    A «Paused» text from before the start arrives late. It does not confirm the new pause.
+    A «Paused» text that the board has sent before the start arrives late. The driver does not take
+    it for the confirmation of the new pause.
     """
     bench = paused()
     notice = b""
@@ -154,7 +155,8 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
     """The board does not receive P, so the pause fails. The driver then refuses motion.
 
-    When the board receives again, the driver pauses it.
+    It refuses motion until ~/start. It also repeats the pause: when the board receives again, it is
+    paused.
     """
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)

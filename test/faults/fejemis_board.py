@@ -27,7 +27,7 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both simulated Teensys, with the interface of a single board.
 
-    ``tick``: number of the campaign's ticks so far.
+    ``tick``: number of the campaign's ticks so far. One of these is ``TICKS`` ticks of the boards.
 
     ``received``: motion commands to the drive board, without checksums and padding.
     """
@@ -71,7 +71,7 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 def half_restarts(half: str) -> Any:
     """Make a case in which one Teensy (``half``) restarts.
 
-    The commands end before the restart, because a restarted Teensy would obey them at once.
+    No commands are sent after the restart, because a restarted Teensy would obey them at once.
     """
 
     def case(rig: Rig) -> None:
@@ -88,8 +88,8 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy (``half``) has the fault ``what`` while the robot drives.
 
-    ``allowed_s``: time in s within which the robot must stop, although commands continue. If it is
-    0, the robot may drive on until the end of the fault.
+    ``allowed_s``: time in s within which the robot must stop, although commands continue. 0 means
+    that the robot need not stop before the end of the fault.
     """
 
     def case(rig: Rig) -> None:

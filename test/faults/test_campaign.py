@@ -21,9 +21,9 @@ LEFT_OUT = {
     "~/pause with true, then false",
     "the driver hangs and continues (SIGSTOP, SIGCONT)",
 }
-"""Cases that this module omits, because it or test/system has a test of a similar case.
+"""Cases that this module omits, because this module or test/system tests a similar case.
 
-The last four cases are similar to tests in test_driver_commands, test_driver_services and
+Tests that are similar to the last four cases are in test_driver_commands, test_driver_services and
 test_driver_guard. "e-stop by topic" is also similar to "1,000 releases a second by topic", which
 this module tests. ``make faults`` runs all cases.
 """
@@ -71,10 +71,10 @@ def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """Under the faults of the other tests, the driver has published nothing false.
+    """During the other tests, which cause faults, the driver has published nothing false.
 
-    Each published message agrees with a frame that the board has sent. A few exceptions are
-    allowed, because some faults damage bytes. Odometry has not jumped.
+    Each published message agrees with a frame that the board has sent, and odometry has not jumped.
+    A few messages may be exceptions, because some faults damage bytes.
     """
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()

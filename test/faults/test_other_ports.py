@@ -12,7 +12,7 @@ from stuck import NETWORK
 LEFT_OUT = "socket: the server delays the data to the board"
 """Name of a case that this module omits.
 
-It is similar to the case in which the server delays all data. ``make faults`` runs both.
+It is similar to the case in which the server delays all data. ``make faults`` runs both cases.
 """
 CASES = {name: case for name, case in NETWORK.items() if name != LEFT_OUT}
 
@@ -40,7 +40,7 @@ def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
 
 
 def test_the_network_publishes_only_what_was_sent(network: NetworkRig) -> None:
-    """In the other tests, the driver has published no message that the board has not sent."""
+    """During the other tests, the driver has published only messages that the board has sent."""
     network.judge_stream()
     assert not network.findings.take(), network.driver.output
     assert network.findings.published > 50

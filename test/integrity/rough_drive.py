@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulated robots that obey, on slopes, with slip and among people, in simulated time.
+"""Simulated robots that obey their commands: on slopes, with slip, and touched by people.
 
-The motion monitor must not stop them.
+They run in simulated time. The motion monitor must not stop them.
 """
 
 import math
@@ -27,7 +27,7 @@ HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
 """Greatest effort of a push against a driving robot, in PWM steps."""
 FASTEST_CARRY_MPS: Final = 0.5
-"""Greatest speed at which people carry a robot whose motors are at rest, in m/s."""
+"""Greatest speed in m/s at which people carry a robot away. The robot's motors are at rest then."""
 SECONDS_BETWEEN_HANDS: Final = 20.0
 
 HANDS: Final = ("push", "bump", "hold", "carry")
@@ -99,7 +99,7 @@ def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
 
 
 class RoughDrive(Bench):
-    """A simulated robot with a commander, among people. Its line delays data in both directions."""
+    """A simulated robot that is commanded and is touched by people, on a line with delays."""
 
     def __init__(self, seed: int, delta_period_s: float = 0.04) -> None:
         self._random = random = Random(f"drive {seed}")
@@ -126,10 +126,7 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """Count the notices of the session, and deliver the driver's writes that are due.
-
-        The writes reach the board after the line's delay.
-        """
+        """Count the notices of the session. Deliver the driver's writes after the line's delay."""
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)

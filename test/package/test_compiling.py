@@ -52,8 +52,9 @@ FAILURES = {
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
     """Build the package into ``lib`` in ``folder``, and return the output of the build.
 
-    A substitute replaces mypyc. ``fails``: Python statement that the substitute runs. ``source``:
-    content of the C file that it writes. ``wanted``: value of ``OMNIBOT_DRIVER_COMPILE``.
+    A small substitute runs instead of mypyc. ``fails``: Python statement that the substitute runs.
+    ``source``: content of the C file that the substitute writes. ``wanted``: value of
+    ``OMNIBOT_DRIVER_COMPILE``.
     """
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
@@ -99,10 +100,7 @@ def test_what_cannot_be_compiled_is_installed_as_it_is(
     reason="no C compiler is installed",
 )
 def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
-    """The package is installed with compiled modules, and later without them.
-
-    The later installation removes the compiled modules.
-    """
+    """A build with compiled modules is followed by one without. It removes these modules."""
     assert f"{PACKAGE}: core: compiled" in built(tmp_path, "pass", GOOD)
     assert compiled_modules(tmp_path / "lib") == [MODULE.replace(".", "/") + ENDING]
     assert built(tmp_path, "raise SystemExit(1)", GOOD)

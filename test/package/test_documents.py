@@ -45,7 +45,7 @@ def name_of(page: Path) -> str:
 
 
 def anchors(page: Path) -> set[str]:
-    """Return the anchors that GitHub and the site give to the page's headings."""
+    """Return the anchors of the page's headings on GitHub and on the documentation's web site."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", text).strip().lower().replace(" ", "-") for text in headings}
 
@@ -85,7 +85,7 @@ def test_no_row_has_lost_its_table(page: Path) -> None:
 
 
 def test_every_page_can_be_reached_from_the_readme() -> None:
-    """The README has a link to each page, so that readers find the page without a search."""
+    """The README has a link to each page, so readers find the page without a search."""
     readme = (ROOT / "README.md").read_text()
     for page in set(ROOT.glob("docs/**/*.md")) - {ROOT / "docs/index.md"}:
         assert f"({page.relative_to(ROOT)}" in readme, page

@@ -41,9 +41,9 @@ def no_python(tmp_path: Path) -> str:
 def test_without_wheels_one_sentence_points_to_jazzy(
     target: str, no_python: str, tmp_path: Path
 ) -> None:
-    """PyPI has no binary packages for this Python, so make fails.
+    """make fails, because PyPI has no binary packages for this Python.
 
-    make names the installation guide of Jazzy, and does not create a virtual environment.
+    The error message names the installation guide of Jazzy. No virtual environment is created.
     """
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()

@@ -27,7 +27,7 @@ ASSIGNMENTS = {"SYMLINK", "GROUP", "MODE", "ATTR{latency_timer}"}
 
 
 def rules(lines: list[str]) -> list[dict[str, tuple[str, str]]]:
-    """Parse each line into its keys, each with operator and value. Fail if a line is not a rule."""
+    """Parse each line to keys with their operators and values. Fail for other lines."""
     parsed = []
     for line in lines:
         tokens = [TOKEN.fullmatch(token) for token in line.split(", ")]
@@ -42,7 +42,7 @@ OFFERED = rules([line.lstrip("#") for line in LINES if line.lstrip("#").startswi
 
 
 def test_every_rule_matches_before_it_assigns() -> None:
-    """Each udev rule has only keys and operators that udev supports."""
+    """In each udev rule, all keys are known, and each key has the operator that belongs to it."""
     for rule in ACTIVE + OFFERED:
         for key, (operator, _) in rule.items():
             assert key in MATCHES | ASSIGNMENTS
@@ -50,9 +50,10 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """The udev file has a rule for each of four adapters. All but one are commented out.
+    """The udev file has a rule for each of four adapters. Only one of the rules is active.
 
-    Each rule makes the link /dev/omnibot, and gives the group dialout access.
+    Each rule, active or commented out, makes the link /dev/omnibot, and gives the group dialout
+    access.
     """
     assert len(OFFERED) == 4
     for rule in OFFERED:
@@ -94,10 +95,10 @@ def unit_settings() -> dict[str, list[str]]:
 
 
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
-    """The systemd unit starts the driver without a shell in between.
+    """The systemd unit starts the driver by ``exec``, so signals reach the driver itself.
 
-    Signals therefore reach the driver itself. The command gives a parameter file, but no port: the
-    port is in the parameter file, because each board has other ports.
+    No shell stays in between. The command gives a parameter file, but no port. The port is in this
+    file, because each board has other ports.
     """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
@@ -106,9 +107,10 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 
 
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
-    """systemd ends the driver by SIGINT.
+    """systemd ends the driver by SIGINT, as ctrl-C does.
 
-    After a crash of the driver, its guard process can still stop the robot.
+    When the driver crashes, systemd sends only SIGINT to the guard process, which ignores it. So
+    the guard can still stop the robot.
     """
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]
@@ -156,9 +158,9 @@ def test_the_first_process_of_a_container_passes_a_stop_on(stop: str) -> None:
 
 @pytest.mark.slow
 def test_a_stop_at_any_moment_of_the_start_ends_the_container() -> None:
-    """The first process of a container receives SIGTERM while it starts the driver.
+    """The first process of a container receives SIGTERM at any moment of the driver's start.
 
-    Neither process stays behind: the first process ends before the driver runs, or it passes
+    No process stays behind. Before the driver runs, the first process ends. Afterwards, it passes
     SIGTERM on to the driver.
     """
     command = [sys.executable, OUTLIVE, "bash", "-c", DRIVER.format("true")]
@@ -180,6 +182,6 @@ def test_a_stop_at_any_moment_of_the_start_ends_the_container() -> None:
 
 
 def test_the_exit_code_of_a_killed_driver_is_that_of_a_shell() -> None:
-    """The driver is killed by SIGKILL. The container's exit code is 137."""
+    """The driver is killed by SIGKILL. The container's exit code is 137, as in a shell."""
     command = [sys.executable, OUTLIVE, "bash", "-c", "kill -KILL $$"]
     assert subprocess.run(command, timeout=60.0, check=False).returncode == 137

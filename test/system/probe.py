@@ -30,10 +30,10 @@ ANSWER_LOST = "client will not receive response"
 """Words in the driver's output when the middleware has dropped an answer of a service."""
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
-"""Options that turn off the events of the middleware, for subscriptions and for publishers.
+"""Options for subscriptions and for publishers that turn off the events of the middleware.
 
-The executor would wait for each of these events, too. This would take more processor time than the
-messages.
+With these events, the executor would wait for each of them, too. This would take more processor
+time than the messages.
 """
 
 
@@ -51,10 +51,10 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 
 @contextmanager
 def ros() -> Iterator[None]:
-    """Set up ROS, and keep one node until the end.
+    """Set up ROS, and keep one node until the end of the tests.
 
-    Without this node, the end of each probe would delete the participant of the middleware. During
-    such a deletion, Fast DDS has crashed twice.
+    As long as this node exists, the end of a probe does not delete the middleware's participant.
+    Fast DDS has crashed twice during such a deletion.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)
@@ -188,7 +188,7 @@ class Probe:
 
     @contextmanager
     def commanding(self, vx: float, yaw_rate: float = 0.0) -> Iterator[None]:
-        """Publish a velocity, in m/s and rad/s, on ``cmd_vel`` at 10 Hz while the context lasts."""
+        """Publish a velocity (m/s, rad/s) on ``cmd_vel`` at 10 Hz within a ``with`` statement."""
         publisher = self.publisher(Twist, "cmd_vel")
         twist = Twist()
         twist.linear.x, twist.angular.z = vx, yaw_rate

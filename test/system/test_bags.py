@@ -67,7 +67,7 @@ def test_every_topic_comes_out_of_a_bag_as_it_went_in(
 ) -> None:
     """All topics of a drive are written to a bag, in both storage formats.
 
-    The bag keeps all bytes, times and qualities of service.
+    The bag then contains the same bytes, times and qualities of service.
     """
     recorder = drive.recorder
     recorder.write(tmp_path / "bag", plugin)
@@ -80,7 +80,7 @@ def test_every_topic_comes_out_of_a_bag_as_it_went_in(
 def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
     """Each recorded message is decoded twice: by rclpy, and with the standard types of Jazzy.
 
-    Both give equal fields.
+    Both results have equal fields.
     """
     for topic, kind in drive.recorder.types.items():
         for _, data in drive.recorder.messages[topic]:
@@ -89,9 +89,9 @@ def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
 
 
 def test_a_bag_played_back_is_heard_as_it_was(drive: Drive) -> None:
-    """A bag's messages are published again with the types and qualities of service from the bag.
+    """A bag's messages are published again, with their recorded types and qualities of service.
 
-    A subscriber receives the same bytes.
+    A subscriber receives the same bytes as in the bag.
     """
     messages, offered = read(drive.bag)
     topics = [topic for topic in messages if topic.startswith(f"/{drive.namespace}/")]
@@ -127,7 +127,7 @@ def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
 
 
 def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
-    """Two drivers replay one bag. They publish identical messages, and still run afterwards."""
+    """Two drivers replay one bag. They publish identical messages, and still run after its end."""
     with ExitStack() as stack:
         replays = [replay(stack, drive) for _ in range(2)]
         for driver, probe, _ in replays:

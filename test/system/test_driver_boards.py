@@ -38,7 +38,7 @@ def start_plain(start_driver: Start, port: str | None, **parameters: object) -> 
 
 
 def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
-    """Return the names relative to ``home``, without those that every ROS node has."""
+    """Return the names without the prefix ``home``. Names that every ROS node has are left out."""
     of_ros = ("parameter", "type_description", "/rosout", "/tf")
     relative = {name.removeprefix(f"{home}/") for name, _types in found}
     return {name for name in relative if not any(word in name for word in of_ros)}
@@ -98,10 +98,10 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """The board obeys cmd_vel, and joint_states has the names of its two wheels.
+    """What the board has works: it obeys cmd_vel, and joint_states has the names of its two wheels.
 
-    ``ask``, a service that only this board has, replies. /diagnostics has figures of the odometry
-    and none of an IMU, because the board has no IMU.
+    ``ask``, a service that only this board has, gives its answer. /diagnostics has figures of the
+    odometry, but none of an IMU, because the board has no IMU.
     """
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))
@@ -161,7 +161,7 @@ def test_the_monitor_shows_what_the_board_has(
 def test_what_means_nothing_to_the_board_is_refused(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """The driver refuses wrong names and values of parameters, and says what it expects."""
+    """The driver does not start with a wrong parameter name or value, and says what it expects."""
     driver = start_plain(start_driver, "/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2

@@ -51,7 +51,8 @@ def profiles() -> dict[str, Element]:
 def allowed(profile: Element) -> Rules:
     """Return the full names that a profile allows, as SROS2 expands them.
 
-    ``~`` is the node. Relative names are in the profile's namespace.
+    A name that begins with ``~`` is relative to the node. A name that begins without a slash is
+    relative to the profile's namespace.
     """
     namespace = profile.attrib["ns"].rstrip("/")
     found: Rules = {"publish": set(), "subscribe": set(), "reply": set(), "request": set()}
@@ -126,7 +127,10 @@ def seen(graph: Node, home: str) -> Rules:
 
 @pytest.mark.parametrize("enclave", sorted(set(profiles()) - {"/omnibot/driver"}))
 def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: str) -> None:
-    """The policy gives other enclaves only the driver's topics and services, and common topics."""
+    """The policy lets other enclaves use only the driver's topics and services, and common topics.
+
+    Common topics are those that every node uses, such as /rosout.
+    """
     driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
     everywhere = {"/rosout", "/parameter_events", "/clock"}
     assert other["publish"] <= driver["subscribe"] | everywhere

@@ -32,7 +32,7 @@ READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""For each event in the middle of a stream, the time in s for which the host does not read."""
+"""For each event in the middle of a stream: the time in s in which the host does not read."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
 """The generator of streams, cached. Callers share each stream, so they must not change it."""
@@ -42,7 +42,7 @@ BOOT_S = 0.7123
 def ftdi_restarted(received: Received, random: Random) -> Chunks:
     """Return the chunks in which an FTDI adapter delivers the bytes.
 
-    The timer of this adapter starts with the first byte of each packet.
+    The first byte of a packet starts the timer of this adapter. Later bytes do not restart it.
     """
     chunks: Chunks = []
     start, timer = 0, math.inf
@@ -114,7 +114,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Return half the width of the narrowest interval with the share ``part`` of the errors."""
+    """Return half the width of the narrowest interval with at least ``part`` of the errors."""
     ordered = sorted(errors)
     ends = zip(ordered, ordered[math.ceil(part * len(ordered)) - 1 :], strict=False)
     return min(high - low for low, high in ends) / 2
@@ -184,7 +184,7 @@ def stamp(
 
 
 def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
-    """Return one stream of three parts: ``before``, the boot text of a board, and ``after``."""
+    """Return one stream: first ``before``, then the boot text of a board, then ``after``."""
     text = b"Paused: 0 \n"
     at = len(before.data) + len(text)
     boots_s = before.times_s[-1] + 0.5
@@ -213,7 +213,7 @@ def _as_read(data: bytes, chunks: Chunks) -> Iterator[tuple[bytes, float]]:
 def _reads(
     data: bytes, chunks: Chunks, random: Random, stalls_at: float, stall_s: float
 ) -> Iterator[tuple[bytes, float]]:
-    """Yield the reads of a host that is a little late at each chunk, and stalls once."""
+    """Yield the reads of a host. It reads each chunk a little late, and once it stalls."""
     at, now = 0, 0.0
     for number, (end, time) in enumerate(chunks):
         now = max(now + READ_S, time + random.expovariate(1.0 / JITTER_S))

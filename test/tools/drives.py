@@ -167,7 +167,7 @@ class Drive:
         return zip(topic.stamp_s, topic.values.tolist(), topic.late_s, strict=True)
 
     def log(self) -> Log:
-        """Return the log that the report reads from a bag of this drive."""
+        """Return this drive as the log that the report would read from a bag."""
         end_s = self.seconds
         nothing = Series(np.empty(0), np.empty(0), np.empty((0, 3)))
         series = [topic.series() for topic in (self.imu, self.odom, self.joints, self.cmd_vel)]

@@ -40,7 +40,7 @@ def view(**changes: Any) -> View:
 
 
 class FakeRobot:
-    """A robot that shows a given view and keeps the requests that it gets."""
+    """A fake robot. It shows the view ``shown``, and keeps the requests to it in ``asked``."""
 
     def __init__(self, *, teleop: bool = False) -> None:
         self.dead_man = DeadMan() if teleop else None

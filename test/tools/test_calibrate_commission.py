@@ -161,7 +161,7 @@ def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
 
 def test_repeated_contradictory_answers_refer_to_the_documentation() -> None:
     """The user gives three contradictory answers. The tool ends and refers to the documentation."""
-    with pytest.raises(ToolError, match=r"wheel B was seen to turn.*docs/commissioning.md"):
+    with pytest.raises(ToolError, match=r"you saw wheel B turn.*docs/commissioning.md"):
         walk("000", "+++", "0-0")
 
 

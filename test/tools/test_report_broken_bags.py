@@ -113,7 +113,7 @@ def test_metadata_that_make_no_sense_are_not_needed(
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     tmp_path: Path, mode: CompressionMode, long_drive: Drive, long_bag: Path
 ) -> None:
-    """An MCAP file breaks off. The report reads all its complete chunks."""
+    """An MCAP file is cut off within a chunk. The report reads all chunks before this one."""
     drive, bag = long_drive, tmp_path / "bag"
     if mode is CompressionMode.NONE:
         shutil.copytree(long_bag, bag)

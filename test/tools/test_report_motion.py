@@ -84,8 +84,8 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 ) -> None:
     """IMU or odometry messages are lost for 2 s during a turn.
 
-    The report does not compare gyro and wheels in this gap. At all other times, gyro and wheels
-    agree.
+    The report does not compare gyro and wheels in this gap. So it finds that they agree, as they do
+    at all other times.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
@@ -93,9 +93,9 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """The odometry has a gap, in which the robot may turn.
+    """The odometry has a gap. The report does not regard the gap as a standstill.
 
-    The report does not regard the gap as a standstill.
+    The robot may turn during the gap.
     """
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
@@ -120,7 +120,7 @@ def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
 
 
 def of_a_fejemis(drive: Drive) -> Log:
-    """Return the log of this drive with the two wheels and the upright IMU of a Fejemis."""
+    """Return the log of ``drive``, changed to the two wheels and the upright IMU of a Fejemis."""
     log = drive.log()
     imu = replace(log.imu, values=log.imu.values * [1, 1, -1, 1, 1, -1])
     joints = replace(log.joint_states, values=log.joint_states.values[:, :2])
@@ -128,7 +128,7 @@ def of_a_fejemis(drive: Drive) -> Log:
 
 
 def test_the_upright_sensor_of_a_fejemis_is_good(drive: Drive) -> None:
-    """The IMU of a Fejemis stands upright, as in its description. The report calls this good."""
+    """The IMU of a Fejemis stands upright, as the robot's description says. This is good."""
     found = judge(of_a_fejemis(drive))
     assert all(finding.level <= Level.NOTE for finding in found)
     (turns,) = [finding for finding in found if "by the gyro" in finding.text]
@@ -149,9 +149,10 @@ def test_a_sensor_of_a_fejemis_that_hangs_upside_down_is_noted(drive: Drive) -> 
 
 
 def test_the_advice_for_a_fejemis_names_only_its_parameters(drive: Drive) -> None:
-    """Turns, gravity and directions of a Fejemis are wrong. The advice is for its parameters.
+    """The report finds faults in the turns, the gravity and the directions of a Fejemis.
 
-    One other name is allowed: ``imu_rpy``, an argument of the robot's description.
+    Its advice names only parameters of this board, and ``imu_rpy``, an argument of the robot's
+    description.
     """
     drive.imu.values[:, 2] *= 1.2
     drive.imu.values[:, 3:] /= 9.80665
@@ -262,9 +263,9 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
 
 
 def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None:
-    """The pose begins again at zero.
+    """The odometry is reset: its pose begins again at zero.
 
-    The report notes this, and does not add the jump to the driven distance.
+    The report notes the reset, and does not add the jump to the driven distance.
     """
     way = said(drive, "Odometry", "drove").text.split(" in all")[0]
     drive.odom.values[450:, :3] = 0.0
@@ -303,9 +304,9 @@ def two_wheels() -> Recorder:
 
 
 def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
-    """A steering joint is not a wheel.
+    """The report takes only driven joints for wheels: it leaves a steering joint out.
 
-    A wheel command with a wrong number of values becomes NaN.
+    It reads a wheel command with a wrong number of values as NaN.
     """
     log = two_wheels().log()
     assert log.wheels == JOINTS[:2]

@@ -2,8 +2,8 @@
 
 """Speed limits for commands. They never change the direction of the linear velocity.
 
-``require_finite`` rejects NaN and infinity. Call it first: the other functions must not get these
-values. The only exception is ``SpeedLimits.allow``.
+Call ``require_finite`` first. It rejects NaN and infinity, which the other functions must not get.
+Only ``SpeedLimits.allow`` may get them, too.
 """
 
 import math
@@ -46,7 +46,7 @@ class SpeedLimits:
         )
 
     def twist(self, wanted: BodyTwist) -> BodyTwist:
-        """Return the twist with its linear velocity shortened and its yaw rate clamped."""
+        """Return the twist, reduced to the limits. The linear velocity keeps its direction."""
         vx, vy = shorten((wanted.vx_mps, wanted.vy_mps), self.linear_mps)
         yaw_rate = max(-self.angular_radps, min(self.angular_radps, wanted.yaw_rate_radps))
         return BodyTwist(vx, vy, yaw_rate)
@@ -104,7 +104,7 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Return the vector, shortened to a length of at most ``limit``, without an overflow."""
+    """Return the vector, shortened to at most ``limit``. Large values cause no overflow."""
     largest = max(map(abs, vector))
     if largest == 0.0:
         return tuple(vector)

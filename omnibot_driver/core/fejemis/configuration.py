@@ -38,14 +38,14 @@ EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
 DIGIT: Final = 6e-4
-"""``NEAR`` (relative) and ``DIGIT`` (absolute): limits for the difference between a written number
-and the number that the board reports. The larger of these two limits applies, because boards print
-few digits."""
+"""``NEAR``, ``DIGIT``: tolerances for the comparison of a number that was written to the board with
+the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute. The larger one
+applies, because boards print few digits."""
 HALF: Final = 0.51
-"""Limit for the difference between a written number and the number that the board reports, in units
-of the last digit that the board prints. If this limit is smaller, it replaces ``NEAR`` and
-``DIGIT``. It is a little more than half a unit, because the board's numbers have single
-precision."""
+"""Tolerance for the comparison of a number that was written to the board with the number that the
+board reports, in units of the last digit that the board prints. It applies if it is smaller than
+the tolerance from ``NEAR`` and ``DIGIT``. It is a little more than half a unit, because the board's
+numbers have single precision."""
 
 
 class Configuration:
@@ -62,13 +62,11 @@ class Configuration:
         """Numbers that the board reported last. The keys are the keywords of the lines. Numbers are
         confirmed when the board reports the same numbers twice in a row."""
         self._digits: dict[str, tuple[float, ...]] = {}
-        """Units of the last printed digits of the numbers in a line. The keys are the keywords of
-        the lines; the values are those of the newest line."""
+        """For each number in the newest line of a kind: the unit of its last printed digit, such as
+        0.001 for ``0.420``. The keys are the keywords of the lines."""
         self.turned = False
-        """Whether the track is the first number in the board's ``confs`` line (steering geometry).
-
-        According to the board's help text, the track is the last number.
-        """
+        """Whether the board's ``confs`` line (steering geometry) has the track as its first number.
+        The board's help text says that the track is the last number."""
         self.written = written
         self.begin()
 
@@ -102,10 +100,7 @@ class Configuration:
 
     @property
     def pending(self) -> bool:
-        """Whether the board is new and may lack the user's settings.
-
-        If so, the robot must not be driven.
-        """
+        """Whether motion is forbidden: the board is new and may still lack the user's settings."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new
@@ -135,7 +130,7 @@ class Configuration:
         return [*texts, *(text for text in ASKED[self.role] if _KEY[text] in keys)]
 
     def hear(self, message: Message) -> None:
-        """Receive a message; store its numbers if they are part of the configuration."""
+        """Receive a message. If it reports values of the configuration, store its numbers."""
         match message:
             case WheelConfiguration():
                 key, numbers = "conf", message.numbers
@@ -161,11 +156,10 @@ class Configuration:
 
     @property
     def geometry(self) -> Geometry | None:
-        """Track B and wheelbase F in m, as the board uses them.
+        """Track B and wheelbase F in m, as the board uses them; None if they are unknown.
 
-        The user's values are returned if the board has not reported its values, or if its values
-        equal the user's, except for rounding. None if neither the user nor the board has given
-        values.
+        The user's values are returned if the board has not reported its own values. They are also
+        returned if the board's values differ from them only by rounding.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):
@@ -210,7 +204,7 @@ def _near(
 ) -> bool:
     """Return whether the board's numbers equal the wanted ones, except for rounding.
 
-    ``digits``: the units of the last digits that the board prints; empty if unknown.
+    ``digits``: for each number, the unit of the last digit that the board prints; empty if unknown.
     """
     exact = digits or (math.inf,) * len(wanted)
     return len(told) >= len(wanted) and all(
@@ -222,7 +216,7 @@ def _near(
 _KEY: Final[Mapping[bytes, str]] = {
     text: text.decode("ascii")[:-1] for texts in ASKED.values() for text in texts
 }
-"""For each line that requests a part of the configuration: the keyword of the answer."""
+"""The keyword of the board's answer, by the line that requests a part of the configuration."""
 _REPORT: Final[Mapping[Written, str]] = {
     Written.WHEELS: "conf",
     Written.STEERING: "confs",

@@ -54,7 +54,7 @@ class Follower:
         self.refusal, self._fault_at = "", -math.inf
 
     def aim(self, angle_rad: float, within_rad: float = FOLLOWS_RAD) -> None:
-        """Set the angle that the wheel must reach, and its allowed deviation, both in rad."""
+        """Set the front wheel's target angle, and the allowed deviation from it, both in rad."""
         self._angle_rad, self._within_rad = angle_rad, within_rad
 
     def look(self, angle_rad: float, now: float) -> bool:

@@ -24,8 +24,8 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
 }  # fmt: skip
 """Requests for each board. They are sent in this order, again and again."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Requests that are sent only with a checksum. If their last letter is lost, they command the
-servo."""
+"""Requests that are sent only with a checksum. Without a checksum, the loss of the last letter
+would turn such a request into a command to the servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 
@@ -33,7 +33,7 @@ SONAR_EVERY_S: Final = 0.1
 class Polls:
     """The requests to one board.
 
-    ``told``: the last answers as text, by keyword.
+    ``told``: the board's last answers as text. The keys are the keywords of the answers.
     """
 
     def __init__(self, role: Role) -> None:
@@ -43,7 +43,7 @@ class Polls:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the answers and begin with the first request, because the board is new."""
+        """Forget all answers and begin with the first request. The board may be another one now."""
         self.told.clear()
         self._turn = 0
         self._next_at = self._sonar_at = -math.inf

@@ -18,7 +18,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """A request of the user that takes some time, and whose result is a JobDone.
+    """A request of the user that takes some time. Its result is a JobDone.
 
     The value of each job is its name in service answers.
     """
@@ -62,9 +62,9 @@ class MagneticReading:
 class BatteryReading:
     """State of the battery.
 
-    ``amps``: in A, negative during discharge; NaN if unknown.
+    ``amps``: current in A, negative during discharge; NaN if unknown.
 
-    ``cells``: 0 if unknown.
+    ``cells``: number of cells; 0 if unknown.
 
     ``low``: whether the mean voltage of a cell is below the limit in the settings.
     """

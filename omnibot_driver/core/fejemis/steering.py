@@ -2,8 +2,8 @@
 
 """Converts a body twist into commands for both boards.
 
-Until the front wheel has reached its angle, the drive board is commanded to drive more slowly.
-Before a turn on the spot, it is commanded to stop.
+The front wheel must first reach its angle. Until then, the driver commands a lower speed from the
+drive board, or a stop if a turn on the spot is to follow.
 
 The module knows geometry and angles; it does not know lines.
 """
@@ -17,21 +17,20 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Limit in rad. If a command's target angle of the front wheel reaches this limit, the command is a
-turn on the spot."""
+"""Limit of the front wheel's target angle, in rad. A command whose target angle reaches this limit
+is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """``ALIGNED_RAD``: largest deviation of the front wheel from its target angle, in rad, at which a
-turn on the spot may begin. Other motion has full speed up to the same deviation.
+turn on the spot may begin. Up to this deviation, other motion may have full speed.
 
-``STILL_ALIGNED_RAD``: largest deviation at which a turn on the spot may continue.
+``STILL_ALIGNED_RAD``: largest deviation, in rad, at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Largest deviation of the front wheel from its target angle, in rad, at which the robot may drive
-at full speed.
+"""Deviation of the front wheel from its target angle, in rad, that defines the permitted error of
+the body's velocity: the error that this deviation causes at full speed.
 
-At full speed, this deviation causes a certain error of the body's velocity. If the deviation is
-larger, the speed is limited so that the error does not become larger than that.
+If the deviation is larger, the speed is limited so that the error stays within the permitted one.
 """
 
 
@@ -41,7 +40,7 @@ class Steered:
 
     ``speed_mps``, ``turn_radps``: speed and turn rate for the front board.
 
-    ``part``: factor, 0..1, by which speed and turn rate are multiplied for the drive board.
+    ``part``: factor, 0..1. The drive board gets the speed and the turn rate times this factor.
 
     ``angle_rad``: the angle that the front wheel must reach.
 
@@ -87,7 +86,7 @@ def scale(twist: BodyTwist, track_m: float) -> float:
 
 
 def outer_mps(twist: BodyTwist, track_m: float) -> float:
-    """Return the rim speed of the outer wheel in m/s, without sign."""
+    """Return the rim speed of the outer wheel in m/s. It is never negative."""
     return abs(twist.vx_mps) + abs(twist.yaw_rate_radps) * track_m / 2
 
 
@@ -121,9 +120,10 @@ def steer(
 
 
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
-    """Return the body's twist at a speed of the outer wheel and an angle of the front wheel.
+    """Return the body's twist, computed by the manual's equations.
 
-    The equations are the manual's. A negative ``outer_mps`` means backward.
+    ``outer_mps``: rim speed of the outer wheel; negative means backward. ``angle_rad``: angle of
+    the front wheel.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)

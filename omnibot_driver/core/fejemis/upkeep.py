@@ -43,25 +43,26 @@ class Upkeep:
             configuration.configure(settings.written)
 
     def begin(self) -> None:
-        """Begin new connections: switch brush and lift off, and configure both boards again."""
+        """Begin anew after a connection: switch brush and lift off, and configure both boards."""
         self.machine.off()
         self.jobs.begin()
         for role in ROLES:
             self._begin(role)
 
     def leave(self) -> None:
-        """End the running job, and send only lines for brush, lift and lights from now on.
+        """Prepare the shutdown: end the running job, and switch brush and lift off.
 
-        Brush and lift are switched off.
+        From now on, send only the lines for brush, lift and lights.
         """
         self._leaving = True
         self.machine.off()
         self.jobs.cancel("the driver is shutting down; start it again")
 
     def restarted(self, role: Role) -> None:
-        """Configure a restarted board again, and end what the restart has interrupted.
+        """Configure the board ``role`` again, because it has restarted.
 
-        Brush and lift are switched off, and the running job ends as failed.
+        Brush and lift are switched off. The restart has interrupted the running job, so this job
+        ends as failed.
         """
         self._begin(role)
         self.machine.begin()
@@ -126,9 +127,9 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """Why the robot must not be driven now: a board's configuration is still being written.
+        """Reason why the robot must not be driven now; empty if it may be driven.
 
-        Empty if no configuration is being written.
+        The reason is that the configuration of a board is still being written.
         """
         for configuration in self.configurations.values():
             if configuration.pending:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversation with a LOIS ECU: received lines become readings, and orders become lines.
+"""Conversation with a LOIS ECU. It decodes received lines, and encodes orders as lines.
 
-The odometry depends on the commands. So ``wrote`` must be called for all bytes that are sent to the
-board.
+The odometry depends on the commands. Therefore ``wrote`` must be called for all bytes that are sent
+to the board.
 """
 
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ class LoisConversation:
 
     @property
     def settings(self) -> LoisEcuSettings:
-        """Settings that cannot be read from the board."""
+        """Settings that the user gives, because the board does not report them."""
         return self._settings
 
     @settings.setter
@@ -164,14 +164,14 @@ class LoisConversation:
 
     @property
     def translation(self) -> Translation:
-        """Translation of reports. It contains the estimate of the robot's motion."""
+        """Translator of reports to readings. It also estimates the robot's motion."""
         return self._translation
 
     @property
     def held_until(self) -> float:
-        """Time at which ``receive(b"", …)`` returns the held reports.
+        """Time at which ``receive`` with b"" returns the reports that are held back.
 
-        It is infinity if none is held.
+        It is infinity if no report is held back.
         """
         return self._decoder.resolves_at
 
@@ -186,10 +186,10 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the robot is at rest after a Stop. None if no tick report can show it.
+        """Return whether the robot is at rest after a Stop; None if tick reports do not show it.
 
-        Old tick reports show nothing. The tick reports of the public firmware also show nothing
-        after a backward command or RPM 0/0.
+        Old tick reports do not show it. After a backward command or RPM 0/0, the tick reports of
+        the public firmware do not show it either.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -247,7 +247,7 @@ class LoisConversation:
 
     @property
     def wake_at(self) -> float:
-        """Time at which to call ``due`` next, and to call ``receive`` with b""."""
+        """Time at which both ``due`` and ``receive`` with b"" must be called next."""
         return min(self._upkeep.wake_at, self._decoder.resolves_at)
 
     @property
@@ -268,26 +268,26 @@ class LoisConversation:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return the set-points RPM 0/0, or no bytes in a terminal mode.
+        """Return the set-points RPM 0/0; in a terminal mode, return no bytes.
 
-        In a terminal mode, the public firmware reads at most 480 characters a second. So in this
-        mode, the driver sends only Stop (``stop``).
+        In a terminal mode, the public firmware reads at most 480 characters a second. So the driver
+        then stops the robot with the Stop (``stop``) alone.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
 
-        Return Stop if the velocity rounds to zero. Raises CommandRefused while a terminal mode, or
-        a change of mode, forbids motion.
+        Return Stop if the velocity rounds to zero. Raises CommandRefused if the robot must not move
+        because of a terminal mode or a change of mode.
         """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Return the lines that command the rates of the left and right wheel, in rad/s.
 
-        Return Stop if both rates round to zero. Raises CommandRefused while a terminal mode, or a
-        change of mode, forbids motion.
+        Return Stop if both rates round to zero. Raises CommandRefused if the robot must not move
+        because of a terminal mode or a change of mode.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
@@ -306,22 +306,22 @@ class LoisConversation:
         return change.reason if change.terminal or change.sensor_wanted else ""
 
     def reset(self) -> bytes:
-        """Return Stop and the reset command. After a reset, the board's counters start at zero."""
+        """Return the lines for Stop and a reset. The reset sets the board's counters to zero."""
         self._decoder.forget_counters()
         self._translation.reset()
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again after a reset.
+        """Write all settings again, because a reset may have changed them.
 
         According to the manual, a reset affects controllers and interfaces.
         """
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Queue ``command``, to be sent several times, because lines may be lost.
+        """Queue ``command``. It is sent several times, because lines may be lost.
 
-        A repetition must be harmless.
+        The command must be one that does no harm if the board receives it several times.
         """
         self._upkeep.writer.write(command, now)
 
@@ -330,10 +330,9 @@ class LoisConversation:
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Request a record.
+        """Request a record. Raises RequestRefused if the board cannot complete the record.
 
-        Raises RequestRefused if the board cannot complete the record. Also raises RequestRefused
-        while a terminal mode, or a change of mode, forbids records.
+        Also raises RequestRefused if a terminal mode or a change of mode does not permit records.
         """
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")

@@ -33,15 +33,15 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group is regarded as complete, if its number of lines fits a report.
+"""Silence in s that ends a group of lines, if a report can have the number of lines in the group.
 The board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
 """Factor for the longest allowed time between two lines of a group.
 
-The longest allowed time is this factor times the time between two marker lines: that of this group,
-and that of the previous group with the same command byte. However, it is at least ``QUIET_S`` and
-at most ``LATE_S``.
+The factor is multiplied by an interval: the time from the previous marker line with the same
+command byte to the marker line of this group. The result is limited to the range from ``QUIET_S``
+to ``LATE_S``.
 """
 
 # Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the
@@ -61,8 +61,8 @@ Timed = tuple[float, Report]
 class Assembler:
     """Assembler of reports from lines.
 
-    Call ``add`` for each line, ``damage`` for characters that are not a line, and ``rest`` while
-    nothing arrives.
+    Call ``add`` for each line, ``damage`` for characters that form no line, and ``rest`` at times
+    when no line has arrived.
     """
 
     def __init__(self, statistics: GroupStatistics, ticks_gate: TicksGate) -> None:
@@ -88,9 +88,9 @@ class Assembler:
 
     @property
     def resolves_at(self) -> float:
-        """Time in s at which the held group is returned if no further line comes.
+        """Time in s at which the group that is held back is returned, if no further line comes.
 
-        It is infinity if no group is held, or if lines of the held group may still be missing.
+        It is infinity if no group is held back, or if lines of the group may still be missing.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -148,7 +148,7 @@ class Assembler:
         return self._end(now) + self._cut_off(now)
 
     def _cut_off(self, now: float) -> list[Timed]:
-        """Discard an unfinished record, because another message came before its end."""
+        """Discard a record that is not complete, because another message has interrupted it."""
         return [(now, self._record.drop())] if self._record.begun else []
 
     # Groups
@@ -162,7 +162,7 @@ class Assembler:
         self._code, self._payloads, self._done, self._astray = code, [], False, False
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Return whether a line that looks like a new marker may be a value of the current group.
+        """Return whether a line that looks like a marker may be a value of the current group.
 
         A marker and the value -1 have the same payload.
         """

@@ -30,9 +30,9 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which a request is sent, counted from its first sending. The intervals are longer
-than the time for which the board may receive nothing. They are not multiples of the usual periods
-of the board's reports."""
+"""Times in s at which the driver sends a request, counted from the first sending. The intervals are
+longer than the longest time in which the board cannot receive. They are not multiples of the usual
+periods of the board's reports."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Unit, in s, of the times in an RPM record. It follows from the unit of the board's clock in its
 tick reports (0x12)."""
@@ -84,12 +84,12 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the decoded readings ``found``, with the result of the request if it is known now.
+        """Return the readings ``found``, with the result of the request if it is known now.
 
-        A record that is not expected is removed. If ``found`` is then empty while lines of a record
-        are arriving, the result is a RecordComes.
+        A record that was not requested is removed from the readings. If no reading is left, but
+        lines of a record are arriving, a RecordComes is returned.
 
-        ``prevented``: why the record cannot come, as a sentence. Empty if it can come.
+        ``prevented``: why the board cannot send the record, as a sentence; empty if it can.
         """
         comes: list[LoisReading] = [RecordComes()] if decoder.in_record else []
         if self.kind is None:

@@ -31,8 +31,9 @@ class LoisEcuSettings:
 
     ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
 
-    ``low_pass``: 0..1, part of a new set-point that each controller step applies. The board boots
-    with 0, so in RPM mode the wheels do not turn until the low-pass is written.
+    ``low_pass``: 0..1, the part of a new set-point that the controller applies in each step. The
+    board boots with the value 0. In RPM mode, the wheels do not turn until a larger value is
+    written.
 
     ``written``: further settings that the user wants on the board.
 

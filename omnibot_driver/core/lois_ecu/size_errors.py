@@ -25,7 +25,7 @@ standard deviation of the fraction of the distance that is lost because both whe
 
 
 class SizeErrors:
-    """Copies of the robot's path, each with an assumed error: a wrong wheel size, or a slip."""
+    """Copies of the robot's path. Each copy has one error: a wrong wheel size, or a slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)
@@ -44,7 +44,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Continue all copies of the path by the given distances of the wheels.
+        """Extend all copies of the path by the distances that the wheels have rolled.
 
         ``track_m``: track width; negative if the wheels are swapped.
         """
@@ -57,7 +57,7 @@ class SizeErrors:
     def covariance(self, yaw_rad: float) -> Covariance:
         """Return the covariance of the pose in a coordinate frame in which its yaw is ``yaw_rad``.
 
-        The frame may be rotated by a constant angle, relative to the frame of the copies.
+        The paths are computed in another frame. The two frames may differ by a constant rotation.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

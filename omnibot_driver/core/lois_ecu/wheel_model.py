@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Model of one wheel's commands: when they take effect, and whether the firmware counts ticks then.
+"""Model of one wheel's commands: when they take effect, and when the firmware counts ticks.
 
 The public firmware counts ticks only while the RPM target is positive.
 
@@ -41,8 +41,9 @@ class WheelModel:
 
     ``kind``, ``target_mps``: the command that the motor follows now.
 
-    ``hidden_mps``: the firmware's RPM target as a speed of the rim. It is kept in duty mode, where
-    it decides whether ticks are counted. A negative duty lowers it with each tick.
+    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. In duty mode, the motor does
+    not follow this target, but the firmware keeps it and counts ticks only while it is positive. A
+    negative duty lowers it with each tick.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -50,8 +51,8 @@ class WheelModel:
         self.target_mps = 0.0
         self.hidden_mps = 0.0
         self.step_s = step_s
-        """Period of the speed controller in s. A command takes effect after half a period on
-        average."""
+        """Period of the speed controller in s. A command takes effect at the next step of the
+        controller, after half a period on average."""
         self._effects: deque[_Effect] = deque(maxlen=128)
         self._heard: tuple[CommandKind, float] = ("rpm", 0.0)
         self._rpm_mps = 0.0
@@ -71,7 +72,7 @@ class WheelModel:
 
     @property
     def unmeasured(self) -> bool:
-        """Whether a duty drives this wheel and the public firmware does not measure its speed."""
+        """Whether a duty drives this wheel, but the public firmware does not measure its speed."""
         return self.kind == "duty" and bool(self.target_mps) and not self.measured_sign
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
@@ -89,7 +90,7 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """Return the time in s of the next effect of a command; infinity if no effect is due."""
+        """Return the time in s at which the next command takes effect; infinity if none waits."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:

@@ -2,8 +2,9 @@
 
 """The exchange with the server: send one request, and find the reply to it.
 
-Replies carry no sequence number, so their form and time are checked. This module knows requests and
-replies; it does not know what the requests are for. The caller passes the time.
+Replies carry no sequence number. So the driver finds the reply to a request by its form and its
+time. This module knows requests and replies; it does not know what the requests are for. The caller
+passes the time.
 """
 
 import math
@@ -28,9 +29,9 @@ from omnibot_driver.core.mart.words import (
 from omnibot_driver.core.packets import Packets
 
 QUICKEST_S: Final = 0.1
-"""Least time in s to wait for the reply to a query, or to a command that changes a motion.
+"""Shortest wait in s for the reply to a query, or to a command that changes a motion.
 
-The time that the server needs for the command is added.
+The time that the server needs to execute the command is added to this wait.
 """
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
@@ -49,13 +50,13 @@ In a disturbed network, a reply may answer an earlier query instead of the last 
 ``DISTURBED_S``: the network is regarded as disturbed for this time after the last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Urgent queries. They are sent even while a late reply to an earlier query may still come.
+"""Urgent queries. The driver sends them even if a late reply to an earlier query may still come.
 
-So such a late reply could be mistaken for the reply to the new query.
+The driver could then mistake the late reply for the reply to the urgent query.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
-"""The kinds of commands whose replies can be mistaken for the reply to another query.
+"""Kinds of commands whose late replies can be mistaken for the reply to a query.
 
 Most of these replies are only a number.
 """
@@ -63,7 +64,8 @@ Most of these replies are only a number.
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
-Any other reply that comes so early belongs to another request, because a check takes time.
+All other replies to a check take time. So any other reply that comes early belongs to another
+request.
 """
 
 
@@ -113,7 +115,7 @@ class Conversation:
 
     ``answered_trip_s``: average duration of answered queries, in s.
 
-    ``missed_s``: time at which a reply was last overdue.
+    ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -141,22 +143,21 @@ class Conversation:
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
 
     def heard(self, form: Form, now: float) -> None:
-        """Record that a reply of this form came; its duplicate may come within ``delay_s``."""
+        """Record that a reply with this form came. Its duplicate may come within ``delay_s``."""
         self._copies_until_s[form] = now + self.delay_s
 
     def answered(self, word: Word, reply: Ok, now: float) -> None:
-        """Record that ``reply``, which was not passed to ``hear``, answers ``word``.
+        """Record that ``reply``, which ``hear`` has not received, is the answer to ``word``.
 
         The driver can then recognise a later copy of this reply.
         """
         self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record that ``reply`` answers an earlier request.
+        """Record that ``reply`` is the late reply to an earlier request.
 
-        After that, no other late reply of the same form is expected.
-
-        Nothing changes if ``reply`` is a copy.
+        After that, no other late reply of the same form is expected. Nothing changes if ``reply``
+        is only a copy of a reply that has come before.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
@@ -169,7 +170,7 @@ class Conversation:
         return max(map(self.late_until_s, word.forms)) - word.least_s
 
     def late_until_s(self, form: Form) -> float:
-        """Return the time until which a late or duplicate reply of this form may come."""
+        """Return the time until which a late or duplicate reply with the form ``form`` may come."""
         owed_s = self._owed_until_s.get(form, -math.inf)
         return max(owed_s, self._copies_until_s.get(form, -math.inf))
 
@@ -182,7 +183,7 @@ class Conversation:
         return now < self._doubled_s + DISTURBED_S
 
     def owes(self, form: Form, now: float) -> None:
-        """Record that a reply of this form may still come, within ``delay_s``."""
+        """Record that a missing reply with the form ``form`` may still come, within ``delay_s``."""
         until_s = now + self.delay_s
         self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
@@ -222,12 +223,15 @@ class Conversation:
         return word
 
     def hurry(self, until_s: float) -> None:
-        """Wait for the reply to the pending request until ``until_s`` at most."""
+        """Limit the wait for the reply to the pending request: it ends at ``until_s`` or before."""
         if self.pending is not None:
             self.pending = replace(self.pending, until_s=min(self.pending.until_s, until_s))
 
     def overdue(self, now: float) -> Word | None:
-        """Give up the pending request if its reply is overdue; return its command, else None."""
+        """Give up the pending request if its reply is overdue, and return the request's command.
+
+        Return None if no reply is overdue.
+        """
         if self.pending is None or now < self.pending.until_s:
             return None
         self.missed_s = now
@@ -239,7 +243,8 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        Replies to HELLO must not be passed: HELLO may be sent while another request is pending.
+        The caller must not pass replies to HELLO, because HELLO may be sent while another request
+        is pending.
         """
         pending = self.pending
         if isinstance(reply, Ok):
@@ -271,10 +276,10 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether ``reply`` is a copy of another reply, and so does not answer ``word``.
+        """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        This is assumed if ``word`` is a query, if an equal reply to another query or to a move has
-        just come, and if the last reply to ``word`` was different.
+        There are three conditions. ``word`` is a query. An equal reply to another query or to a
+        move has just come. The last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA
@@ -291,8 +296,8 @@ class Conversation:
     ) -> bool:
         """Return whether a reply identical to ``reply`` came within the last ``delay_s``.
 
-        ``but``: the command whose replies are ignored. ``kinds``: only the replies to these kinds
-        of commands are compared.
+        ``but``: a command; replies to this command are ignored. ``kinds``: the kinds of commands
+        whose replies are compared.
         """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and word.kind in kinds

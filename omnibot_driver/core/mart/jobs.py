@@ -19,16 +19,17 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 
 PIECE: Final = 512
 QUIET_S: Final = 1.0
-"""Time in s without a piece after which the driver does not expect further pieces of a file.
+"""Time in s that the driver waits for a further piece of a file. Then it expects no more pieces.
 
-If all bytes of the file have come, a third of this time is enough.
+After it has received all bytes of the file, it waits for only a third of this time.
 """
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn. The robot is at rest while the driver waits.
 
-``RECORD_S``: for the reply to the request. The duration of three average queries is added.
+``RECORD_S``: wait for the reply to the request. The duration of three average queries is added to
+this wait.
 
-``RECORD_QUIET_S``: for each piece of the file after the first piece.
+``RECORD_QUIET_S``: wait for each further piece of the file, after the first piece.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a job in REPEATED."""
@@ -66,7 +67,8 @@ WORD_OF: Final[dict[Job, Word]] = {
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
 OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
-"""Jobs that the driver begins by itself. A user's job can replace one that was not sent yet."""
+"""Jobs that the driver begins by itself. A job of the user can replace such a job before it is
+sent."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs whose request may be sent again if the reply is missing."""
 
@@ -76,11 +78,11 @@ class Jobs:
 
     ``done``: results that the caller has not taken yet.
 
-    ``logging``: whether the server has acknowledged LOG, which starts its log, in this connection.
+    ``logging``: whether the server has started its log in this connection: it has acknowledged LOG.
 
     ``ended``: whether EXIT was sent, which ends the server.
 
-    ``moving``: whether the docking move was sent.
+    ``moving``: whether the move of a docking job was sent.
 
     ``turn_record``: name and pieces of the file of the last turn; None if the download was
     cancelled.
@@ -132,9 +134,10 @@ class Jobs:
         return f"{since}, {sum(map(len, self._pieces))} of {self._size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job. It replaces a job of the driver itself that was not sent yet.
+        """Begin a job. It replaces a job that the driver itself began and has not sent yet.
 
-        Raises RequestRefused during another job, or if there may be no log to download.
+        Raises RequestRefused while another job is in progress. Also raises RequestRefused if the
+        log is to be downloaded, but the server may have no log.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -191,7 +194,7 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """Repeat or end the job if the reply to its request did not come in time.
+        """Repeat or end the job: the reply to the request with the command ``word`` is missing.
 
         Nothing changes if ``word`` is not the command of the job.
         """
@@ -221,7 +224,7 @@ class Jobs:
             )
 
     def piece(self, data: bytes, now: float) -> None:
-        """Keep a datagram as a piece of the file if it has the size of a piece."""
+        """Keep a datagram as a piece of the file if it is as long as a full or the last piece."""
         if data and len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
             complete = len(self._pieces) * PIECE >= self._size

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""A reply whose time uncertainty is at least this long, in s, is regarded as uncertain."""
+"""Limit in s. A reply is regarded as uncertain if the time of its value is uncertain by this much
+or more."""
 
 
 @dataclass(frozen=True, slots=True)

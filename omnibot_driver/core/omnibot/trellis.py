@@ -28,9 +28,10 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""A frame is sure if every other interpretation of its first byte costs at least this much more.
+"""Cost difference that makes a frame sure. Every interpretation that reads the frame's first byte
+in another way must cost at least this much more.
 
-A difference of this size means that the other interpretation is at least 30 times less likely.
+With this difference, the other interpretation is at least 30 times less likely.
 """
 STEP: Final = 5.5
 """First cost limit of the search, as a distance above the lower bound of the cost.
@@ -69,7 +70,7 @@ _HEADLESS: Final = {
     **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
 }
 """Possible lengths and costs of a frame that has lost one of its two header bytes. The key is the
-header byte that was not lost."""
+header byte that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 _BEGINNINGS: Final = (_HEADER, _TEXT)
@@ -79,8 +80,8 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 class Segment:
     """A complete frame of the best interpretation.
 
-    * ``start``, ``end``: its position among the bytes.
-    * ``sure``: whether every other interpretation of its first byte costs clearly more.
+    * ``start``, ``end``: its position among the bytes. * ``sure``: whether every interpretation
+      that reads its first byte in another way costs clearly more.
     """
 
     start: int
@@ -92,9 +93,10 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""Start node, end node and cost of an edge, a frame, and what is known after the frame.
+"""An edge of the graph: its start node, end node and cost, its frame, and what is known after this
+frame.
 
-The last two are None if the edge is not a complete frame.
+The frame and what is known after it are None if the edge is not a complete frame.
 """
 
 
@@ -217,7 +219,7 @@ class _Search:
         self._edge(node, 2 * end + 1, price + self._idle_within(at, end), frame, after)
 
     def _damaged(self, at: int, closed: bool) -> None:
-        """Add edges for each damaged frame that may begin with the byte at ``at``."""
+        """Add edges for all damaged frames that could begin with the byte at ``at``."""
         data, size, node = self._data, len(self._data), 2 * at + 1
         spare = self._limit - self._cost[node]
         first = data[at]
@@ -243,7 +245,7 @@ class _Search:
                 self._edge(node, 2 * end + 1, price + self._idle_within(at, end))
 
     def _open(self, at: int, price: float) -> None:
-        """Add an edge for a frame from ``at``, damaged or not, whose end has not arrived yet."""
+        """Add an edge for a frame, damaged or not, that begins at ``at`` and has not ended yet."""
         self._edge(2 * at + 1, self._end, price + self._idle_within(at, len(self._data)))
 
     def _idle_within(self, start: int, end: int) -> float:
@@ -267,7 +269,7 @@ class _Search:
         self._edges.append(edge)
 
     def _context(self, node: int) -> Context:
-        """Return what is known from the frames on the cheapest path to ``node``.
+        """Return the context at ``node``: what is known from the frames on the cheapest path to it.
 
         After a damaged frame or unexplained bytes, little is known.
         """

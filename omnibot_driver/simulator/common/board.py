@@ -20,9 +20,9 @@ class Channel:
     """One connection between a board and the computer.
 
     name: empty if the board has only one channel.
-    parameter: name of the driver's parameter for this port; empty if the channel uses the UDP port
-        that follows the port of the previous channel.
-    datagrams: whether the channel carries UDP datagrams; else it is serial.
+    parameter: name of the driver's parameter for this port. It is empty if the channel uses the UDP
+        port after that of the previous channel.
+    datagrams: whether the channel carries UDP datagrams. If not, it is a serial line.
     """
 
     name: str = ""
@@ -33,7 +33,8 @@ class Channel:
 class SimulatedBoard(Protocol):
     """A board with its robot.
 
-    A simulated board is pure: the same settings and input give the same output.
+    A simulated board depends only on its settings and its input: the same ones always give the same
+    output.
     """
 
     @property

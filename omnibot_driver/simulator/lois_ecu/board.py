@@ -113,7 +113,7 @@ class SimulatedLois:
 
     @property
     def lost_bytes(self) -> int:
-        """Number of bytes of ``received`` that the board lost."""
+        """Number of bytes that were sent to the board and that the board has lost."""
         return self._uart.lost_bytes
 
     @property
@@ -267,7 +267,7 @@ class SimulatedLois:
             self._uart.say(data, deaf=False)
 
     def _catch_up(self) -> None:
-        """Serve the interrupts that came while interrupts were off."""
+        """Run the interrupt routines that had to wait while interrupts were off."""
         pending, self._pending = self._pending, {}
         for index, (is_long, direction) in pending.items():
             self._edge(index, self.now_s, is_long, direction)
@@ -282,7 +282,7 @@ class SimulatedLois:
     def _main_loop(self) -> None:
         """Run the main loop for 1 ms.
 
-        In this time, the loop completes the current pass over the timers and makes one more.
+        In this time, the loop completes the current check of all timers, and checks them once more.
         """
         for _ in range(2):
             if not self._scan:
@@ -322,7 +322,7 @@ class SimulatedLois:
             self._say(self._sayings.group(code, self._clock_ms, self.now_s))
 
     def _say_record(self, data: bytes) -> None:
-        """Send a complete record, and restart the periods of the periodic messages."""
+        """Send a complete record. The periods of all periodic messages then start again."""
         if data:
             self._say(data)
             self._timers.restart(self._clock_ms)

@@ -16,8 +16,9 @@ TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_PER_TURN_US = 300_000
-"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. The board does
-not compute a speed from an encoder level that is shorter than this time / edges per turn."""
+"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. This time
+divided by the edges per turn is a limit: the board computes no speed from a shorter encoder
+level."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024
@@ -51,7 +52,7 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Encoder ticks since the board's odometry last used them; negative if the wheel truly
+        """Encoder ticks that the board's odometry has not used yet; negative if the wheel truly
         turned backward."""
         self.record: list[int] = []
         self.record_left = 0

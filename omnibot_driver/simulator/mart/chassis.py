@@ -158,7 +158,7 @@ class Chassis:
         return applied, speed_mps
 
     def step(self) -> float:
-        """Advance by 10 ms. Return the turn rate in deg/s, which has noise while a wheel turns."""
+        """Advance by 10 ms. Return the robot's turn rate in deg/s, with noise if a wheel turns."""
         self._applied_right, right = self._turn(
             STOP - self.right, self._applied_right, self.right_mps, self._gain_right
         )

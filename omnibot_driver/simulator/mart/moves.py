@@ -2,9 +2,9 @@
 
 """The start of each kind of motion, and its end by a command.
 
-A start or an end has several steps. Each step is a function that the server calls later. The server
-is an argument of the function, so that a copy of the server can call it too. This module knows
-motions; it does not know the words of commands.
+A start or an end has several steps. Each step is a function that the server calls later, and that
+gets the server as an argument. So if the server is copied, the copy can call the later steps, too.
+This module knows motions; it does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING
@@ -24,12 +24,12 @@ PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
 LINEAR_S = REFERENCE_S = 0.015
-"""``LINEAR_S``, ``REFERENCE_S``: time in s that the set-up of the motor board takes before a linear
-move and before a reference move."""
+"""Time in s in which the server sets up the motor board before a motion. ``LINEAR_S``: before a
+linear move. ``REFERENCE_S``: before a reference move."""
 
 
 def start_linear(server: "MartServer", word: str, *, backward: bool) -> None:
-    """Start an uncontrolled move (F, B)."""
+    """Start an uncontrolled move (F, B), which has no target distance."""
     motion = server.motions[Kind.LINEAR]
     motion.word, motion.backward, motion.no_clearance = word, backward, False
     motion.speed = server.custom.get("linear", (5, motions.SPEEDS[word]))[1]
@@ -51,7 +51,8 @@ def start_controlled(
 ) -> None:
     """Start a move over a distance (TF, TB, PTF, MCF, MCB).
 
-    ``inches``: 0 or less is unlimited. ``plain``: the reply has no distance.
+    ``inches``: the distance; 0 or less means no limit. ``plain``: whether the reply contains no
+    distance.
     """
     motion = server.motions[kind]
     motion.word, motion.backward = word, backward
@@ -121,7 +122,7 @@ def _go(server: "MartServer", motion: Motion, right: int, left: int) -> None:
 
 
 def start_reference(server: "MartServer", speed: int) -> None:
-    """Start a reference move (RM)."""
+    """Start a reference move (RM), a forward drive with changes of speed."""
     motion = server.motions[Kind.REFERENCE]
     motion.speed, motion.backward, motion.no_clearance = speed, False, False
     server.starting = Kind.REFERENCE
@@ -145,7 +146,7 @@ def _go_reference(server: "MartServer", speed: int) -> None:
 
 
 def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
-    """Start an uncontrolled spin (R, L)."""
+    """Start an uncontrolled spin (R, L), which has no target angle."""
     server.motions[Kind.SPIN].word = word
     server.starting = Kind.SPIN
     server.later(WRITES_S, _go_spin, Kind.SPIN, left)
@@ -154,8 +155,8 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    An angle of 0 degrees or less only tests the IMU. With the quirk ``probe_turns``, the motors
-    then run too.
+    An angle of 0 degrees or less only tests the IMU. With the quirk ``probe_turns``, the motors run
+    during this test, too.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word
@@ -192,7 +193,7 @@ def _go_spin(server: "MartServer", kind: Kind, left: bool) -> None:
 
 
 def started(server: "MartServer", kind: Kind) -> None:
-    """Answer the command of an uncontrolled motion, which has started or failed to start."""
+    """Answer the command that has started an uncontrolled motion, or has failed to start it."""
     motion = server.motions[kind]
     server.starting = None
     if kind is Kind.REFERENCE and (server.settings.reference_start_fails or motion.error):
@@ -206,7 +207,7 @@ def started(server: "MartServer", kind: Kind) -> None:
 
 
 def controlled_done(server: "MartServer", kind: Kind) -> None:
-    """Save the file of a controlled motion that has ended, and answer its command."""
+    """End a controlled motion: save its file, and answer the command that has started it."""
     motion = server.motions[kind]
     server.starting = None
     motion.running = False
@@ -227,7 +228,7 @@ def last_distance_in(server: "MartServer") -> int:
 
 
 def stop(server: "MartServer", kind: Kind) -> None:
-    """Stop an uncontrolled motion (SM, SRM)."""
+    """Stop a motion that has no target distance or angle (SM, SRM)."""
     if end_motion(server, server.motions[kind]):
         server.wait(COMMAND, kind, stopped, kind)
     else:
@@ -235,7 +236,7 @@ def stop(server: "MartServer", kind: Kind) -> None:
 
 
 def stopped(server: "MartServer", kind: Kind) -> None:
-    """Answer a stop (SM or SRM). The robot has come to rest, or has failed to come to rest."""
+    """Answer a stop (SM or SRM) after the robot has come to rest, or has failed to do so."""
     motion = server.motions[kind]
     motion.running = motion.released = False
     if kind is Kind.LINEAR:

@@ -18,7 +18,8 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 COMMAND, STOP = 0, 1
 """``COMMAND``, ``STOP``: indices of the command port and of the stop port."""
 NEAR_READINGS_S = 0.15
-"""Duration in s of the three sonar readings that confirm a near obstacle."""
+"""Duration in s of three sonar readings. The server needs three readings to confirm that an
+obstacle is near."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
 """Time in s that the server adds to a negative duration, because the server counts ms in an
@@ -29,7 +30,7 @@ Then = Callable[..., None]
 
 
 class Waiter(NamedTuple):
-    """A port's thread that waits for the notice that a motion has started or stopped."""
+    """A port whose thread waits until a motion of ``kind`` has started or stopped."""
 
     port: int
     kind: Kind
@@ -61,7 +62,7 @@ class ServerState:
         self.files: dict[str, FileNote] = {}
 
     def begin(self) -> None:
-        """Reset all that the program knows, as at its start."""
+        """Reset all that the server's program knows, as at its start."""
         self.crashed = ""
         self.motions = [Motion(kind) for kind in Kind]
         self.alarm: Kind | None = None
@@ -116,7 +117,7 @@ class ServerState:
 
     @property
     def driven_m(self) -> float:
-        """Distance in m that the right wheel's encoder has counted since it was reset."""
+        """Distance in m that the right wheel's encoder has counted since its last reset."""
         return self.chassis.counts * self.settings.metres_per_count
 
     @property
@@ -159,14 +160,15 @@ class ServerState:
 
     @property
     def heading_integrates(self) -> bool:
-        """Whether turning changes the relative heading now."""
+        """Whether the relative heading that the server reports follows a turn of the robot now."""
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:
         """Record the time at which the server samples the IMU in a forward drive (RM).
 
-        With the quirk ``heading_starts_off``, the first sample changes the heading. If the clock
-        was set back, this change is huge.
+        With the quirk ``heading_starts_off``, the first sample of a drive changes the heading. The
+        change grows with the time since the last drive, and is huge if the clock was set back since
+        then.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s

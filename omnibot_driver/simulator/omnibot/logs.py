@@ -12,8 +12,9 @@ CommandKind = Literal["velocity", "pose", "wheels", "estop", "start", "pause", "
 
 @dataclass(frozen=True, slots=True)
 class ReceivedCommand:
-    """A command that the board obeyed after ``tick`` ticks.
+    """A command that the board obeyed.
 
+    tick: number of the board's ticks before it obeyed the command.
     values: the three words of a control frame; zeros for a state letter.
     """
 

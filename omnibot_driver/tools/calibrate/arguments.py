@@ -19,7 +19,8 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""A parameter that a driver has only if its board records encoder ticks and accepts gains."""
+"""Name of a parameter. Only a board that records encoder ticks and accepts gains has this
+parameter."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -33,10 +34,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand: the names of driver parameters, and a text for the error message.
+"""For each subcommand: names of driver parameters, and a text such as "an IMU".
 
-The driver must have at least one of these parameters. Otherwise the subcommand does not work with
-the board, and the error message says that the board does not have what the text names.
+The subcommand works only if the driver has at least one of these parameters. If it has none, an
+error message says what the board does not have, in the words of the text.
 """
 
 

@@ -21,7 +21,7 @@ STILL: Final[Pattern] = (0, 0, 0)
 
 
 class Contradiction(Exception):
-    """An answer or a measurement cannot be right. The message gives the reason."""
+    """Raised if an answer or a measurement cannot be right. The message gives the reason."""
 
 
 def understand(answer: str) -> Pattern | None:
@@ -74,7 +74,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
         )
     if turned != [wheel]:
         raise Contradiction(
-            f"wheel {name} was commanded, but wheel {WHEELS[turned[0]]} was seen to turn. According"
+            f"wheel {name} was commanded, but you saw wheel {WHEELS[turned[0]]} turn. According"
             " to the manual, A is front right, B front left, C at the back. Perhaps you take the"
             " wrong side of the robot for its front. If not, the wheels are in the wrong order,"
             " which no parameter corrects"
@@ -99,10 +99,10 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 
 
 def mirrored(signs: Sequence[int]) -> bool:
-    """Return whether these signs of the axes describe a mirror image of the robot.
+    """Return whether a robot with these signs of its axes would be a mirror image of the real one.
 
-    They do if sign(x) sign(y) differs from sign(yaw). Choosing another side of the robot as its
-    front does not mirror the signs.
+    This is so if sign(x) sign(y) differs from sign(yaw). A user who takes another side of the robot
+    for its front changes the signs, but does not mirror them.
     """
     x, y, yaw = signs
     return x * y != yaw

@@ -15,17 +15,18 @@ from omnibot_driver.core.geometry.se2 import Pose
 
 BRAILLE: Final = 0x2800
 DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-"""Bits of the dots in a Braille character, which has four rows of two dots."""
+"""The bit of each dot in a Braille character, which has four rows of two dots."""
 BARS: Final = " ▁▂▃▄▅▆▇"
 ARROWS: Final = "→↗↑↖←↙↓↘"
 SMALLEST_M: Final = 0.5
-"""Smallest width or height, in m, of a path's picture, so that noise does not fill the picture."""
+"""Smallest length in m that the width or height of a picture shows, so that noise does not fill the
+picture."""
 LARGEST_M: Final = 1e6
 
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture: rows of equal length, and the width in m that a row shows."""
+    """A picture: rows of equal length, and the distance in m that the length of a row shows."""
 
     rows: list[str]
     width_m: float
@@ -34,9 +35,9 @@ class Picture:
 def draw_path(
     points: Iterable[tuple[float, float]], columns: int, rows: int, robot: Pose | None = None
 ) -> Picture:
-    """Draw a path from above, as large as possible; x is to the right, y is up.
+    """Draw a path, seen from above and as large as possible.
 
-    An arrow shows the ``robot``.
+    The x axis points to the right, the y axis up. An arrow shows the pose ``robot``.
     """
     columns, rows = max(1, columns), max(1, rows)
     seen = [point for point in points if _drawable(*point)]
@@ -74,7 +75,10 @@ def draw_path(
 
 
 def sparkline(values: Sequence[float], columns: int) -> str:
-    """Return the newest values as bars, newest at the right. The largest value has full height."""
+    """Return the newest values as bars of different height, with the newest at the right.
+
+    The largest value has full height.
+    """
     shown = values[-columns:] if columns > 0 else []
     peak = max(shown, default=0.0) or 1.0
     bars = "".join(BARS[math.ceil(value / peak * (len(BARS) - 1))] for value in shown)

@@ -29,7 +29,7 @@ class VelocityTopic:
     Both use the message type of the driver's subscription, because a process must use only one type
     for a topic.
     ``heard``: function that is called with each command on the topic.
-    ``dead_man``: if None, nothing is published.
+    ``dead_man``: the switch whose commands are published; if None, nothing is published.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class VelocityTopic:
     ) -> None:
         self.dead_man = dead_man
         self.steers = False
-        """Whether another node receives the commands that this object publishes."""
+        """Whether this object publishes commands, and another node receives them."""
         self._node, self._driver, self._heard = node, driver, heard
         self._subscription: Any = None
         self._publisher: Any = None

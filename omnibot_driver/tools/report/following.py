@@ -37,11 +37,11 @@ timed out."""
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """A command topic, and measurements of the motion that it commands.
+    """A topic, its commands, and the measurements of the motion that they command.
 
     ``weights``: for each axis, the factor that converts a value to the speed of a wheel's rim in
     m/s.
-    ``scales``: for each axis, the driver's parameter to change if the values are wrong.
+    ``scales``: for each axis, the driver's parameter to change if commands and measurements differ.
     """
 
     topic: str
@@ -72,7 +72,8 @@ def twists(log: Log) -> Pair:
 def _scales(log: Log) -> tuple[str, str]:
     """Return the names of the parameters that scale linear and angular speed.
 
-    With two wheels, the parameters scale the odometry, otherwise the commands.
+    For a robot with two wheels, these parameters scale the odometry. For other robots, they scale
+    the commands.
     """
     if log.two_wheels:
         return "odom_linear_scale", "odom_angular_scale"
@@ -98,23 +99,24 @@ def pairs(log: Log) -> list[Pair]:
 
 
 def wheel_name(joint: str) -> str:
-    """Return the name of a wheel for the reader, such as "wheel A" or "left wheel"."""
+    """Return the name of a wheel as the report shows it, such as "wheel A" or "left wheel"."""
     words = joint.removesuffix("_joint").split("_")
     return " ".join(word.upper() if len(word) == 1 else word for word in words)
 
 
 def shown(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements to draw.
+    """Return what to draw: pairs of commands and measurements.
 
-    If the log has no commands, return one pair with the measurements of odom.
+    If the log has no commands, the only pair has the measurements of odom.
     """
     return pairs(log) or [twists(log)]
 
 
 def _sampled(series: Series) -> Series:
-    """Return the finite rows that have a timestamp. Convert timestamps to the recorder's clock.
+    """Return the finite rows that have a timestamp, with timestamps by the recorder's clock.
 
-    They can then be compared with commands, states and e-stops, whose times are by that clock.
+    The times of commands, states and e-stops are by the same clock, so the rows can be compared
+    with them.
     """
     rows = series.only(series.finite & np.isfinite(series.stamp_s))
     return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)
@@ -139,7 +141,8 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    ``usable``: which measurements to use. The delay is the one that fits the measurements best.
+    ``usable``: for each measurement, whether to use it. The returned delay is the one with which
+    commands and measurements fit best.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -226,8 +229,8 @@ def _rim_speed(pair: Pair) -> Array:
 def _stopped(log: Log, at_s: Array) -> Mask:
     """Return, for each time in ``at_s``, whether the driver carried out no commands at that time.
 
-    The driver carries out no commands while the e-stop is latched or the board does not run, and in
-    the 0.5 s after that.
+    The driver carries out no commands while the e-stop is latched, and while the board does not
+    run. The 0.5 s after each such period are included.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
@@ -237,7 +240,7 @@ def _stopped(log: Log, at_s: Array) -> Mask:
 
 
 def _sustained(times_s: Array, rows: Mask) -> list[Span]:
-    """Return the spans of time in which ``rows`` is true for at least 1 s (``SUSTAINED_S``)."""
+    """Return the spans of time of at least 1 s (``SUSTAINED_S``) in which ``rows`` stays true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]
@@ -268,8 +271,8 @@ def _stalled(stalls: list[Span]) -> Iterator[Finding]:
             "The robot stood still although it was commanded to move:"
             f" {counted(len(stalls), 'time')}, {span(sum(item.length_s for item in stalls))} in"
             f" all, first at {stalls[0].begin_s:.1f} s.",
-            "Check the motors' power, the board's own e-stop and its switch (velocity control),"
-            " and that nothing blocks the wheels.",
+            "Check the motors' power, the board's own e-stop and the board's switch for velocity"
+            " control. Check that nothing blocks the wheels.",
         )
 
 
@@ -333,5 +336,5 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             f"The robot moved {counted(len(moving), 'time')} without a command, first at"
             f" {moving[0].begin_s:.1f} s.",
             "Someone may have pushed the robot, or a topic that is not in the recording may have"
-            " commanded it. Otherwise see docs/safety.md.",
+            " commanded it. If neither is the case, see docs/safety.md.",
         )

@@ -95,14 +95,17 @@ def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
 
 
 def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
-    """A displacement may have ended before Stop arrived, so it is ignored for 50 ms after Stop."""
+    """A displacement that arrives within 50 ms after Stop does not prove rest.
+
+    It may have ended before Stop arrived.
+    """
     for _ in range(10):
         proof.look(moved(), 10.049)
     assert not proof.proved
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """A robot was driven, so ``owed`` is true: a proof of rest is still needed.
+    """After a drive, ``owed`` is true: the driver still needs a proof of rest.
 
     Only displacements of zero give this proof; a new connection or a Stop does not.
     """
@@ -138,7 +141,10 @@ def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) ->
 
 
 def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
-    """The board is paused. This proves that the robot is at rest, without any displacement."""
+    """A board reports that it is paused. This proves that the robot is at rest.
+
+    No displacement is needed for this proof.
+    """
     proof.paused()
     assert proof.proved
 

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of random input from the boards.
+"""Tests with random input from the boards.
 
-The driver does not raise an error, loop for ever or move the robot.
+No input makes the driver raise an error, loop for ever or move the robot.
 """
 
 import contextlib
@@ -107,7 +107,7 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
 
 @pytest.mark.slow
 def test_a_stream_that_the_firmware_does_not_know_is_told_and_not_asked_for_again() -> None:
-    """The firmware does not know one stream, here that of the time-of-flight sensor.
+    """The firmware does not know one stream: ``tofd``, from the time-of-flight sensor.
 
     A notice says so, and the driver no longer subscribes to this stream.
     """

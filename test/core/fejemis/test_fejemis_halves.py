@@ -70,7 +70,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
 def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
-    """The driver stalls. Afterwards it reports only a board that still sends nothing."""
+    """After a stall of the driver, it reports only boards as silent that still send nothing."""
     bench = nominal()
     bench.drive_on()
     bench.now += 3.0
@@ -216,8 +216,7 @@ def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
     """One board never sends anything, or both ports lead to a drive board.
 
     For up to 5 s, the driver repeats Stop. Afterwards, it tries to start the boards twice a second,
-    and sends one Stop with each try. If the e-stop is latched, the driver repeats it 20 times a
-    second.
+    and sends one Stop with each try. While the e-stop is latched, it sends Stop 20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks
@@ -292,7 +291,7 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
 def test_the_diagnostics_show_the_latest_unknown_lines() -> None:
     """The drive board receives four lines that it does not know, and then the first one again.
 
-    It reports each unknown line. The diagnostics show the latest three, each only once.
+    It reports each of these lines. The diagnostics show the latest three, without repetitions.
     """
     bench = nominal()
     bench.robot.receive(b"wa\nwb\nwc\nwd\nwa\n", bench.now, DRIVE)

@@ -21,7 +21,7 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 
 LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
-"""Time in s after which the order of gyro and acceleration line is known.
+"""Time in s after which the driver knows which comes first: the gyro line or the acceleration line.
 
 This time is long enough if reads are at most 100 ms apart.
 """
@@ -31,7 +31,7 @@ This time is long enough if reads are at most 100 ms apart.
 class Line:
     """A line that the board sends at ``sent_s``.
 
-    ``number``: number of the IMU sample with which the line is sent.
+    ``number``: number of the IMU sample in the same cycle of the board.
     """
 
     sent_s: float
@@ -47,8 +47,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: all other lines come only with every second sample, with odd sample numbers if True and
-    with even ones if False.
+    ``odd``: all other lines come only with every second sample. If ``odd`` is True, these are the
+    samples with odd numbers. If it is False, they are those with even numbers.
     """
 
     order: str
@@ -105,7 +105,7 @@ def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) ->
 def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[float]) -> list[Read]:
     """Divide the lines into the reads of a slow connection.
 
-    A read has 1 to 60 bytes, with pauses in between.
+    Each read has 1 to 60 bytes. A pause from ``pauses_s`` comes before each read.
     """
     reads: list[Read] = []
     now, due, sent = 0.0, 0, 0
@@ -150,7 +150,7 @@ class Outcome:
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """False pairs that cannot be recognized, because nothing in the stream shows their error."""
+    """The false pairs that cannot be recognized, because nothing in the stream shows the error."""
 
 
 def outcome(reads: list[Read]) -> Outcome:
@@ -198,9 +198,9 @@ def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
 
 
 def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Read]) -> None:
-    """Check that no pair is false, and that each sample after the first 0.5 s was found once.
+    """Check that no pair of lines is false, and that each sample was found once.
 
-    The last samples may still be missing.
+    The samples of the first 0.5 s and the last samples may be missing.
     """
     assert result.false == []
     known = next(line.number for now, some in reads if now > KNOWN_S for line in some)
@@ -277,8 +277,8 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
 
-    There is one exception. If both lines of a false pair are late, and no pose follows in the same
-    read, nothing in the stream shows that the lines belong to different samples.
+    One kind of false pair is excepted: both of its lines are late, and no pose follows in the same
+    read. Then nothing in the stream shows that the lines belong to different samples.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -293,8 +293,8 @@ def test_no_pair_has_lines_of_two_samples(
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """The drive board is silent for a while, and then sends samples and poses again.
 
-    The first message after the silence is a sample or a pose. The time of a sample before the first
-    pose is unknown, so the driver leaves this sample out.
+    If a sample comes before the first pose, its time is unknown. The driver does not publish such a
+    sample, so no sample gets a stamp from before the silence.
     """
     bench = nominal()
     for phase_s in (0.0, 0.005, 0.01, 0.015):
@@ -311,9 +311,9 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 
 @pytest.mark.slow
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
-    """The host reads every 0.2 s. In each read, samples come before the first pose.
+    """The host reads every 0.2 s. Each read begins with samples, before its first pose.
 
-    The driver leaves none of these samples out.
+    The driver publishes these samples, too.
     """
     bench = nominal()
     bench.run(3.0)

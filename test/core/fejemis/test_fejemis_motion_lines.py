@@ -68,9 +68,9 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 
 @pytest.mark.slow
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """A line loses one or two characters, and another line follows. No wrong motion is read.
+    """A line loses one or two characters. The board reads no wrong motion.
 
-    The following line matters if the line end is lost.
+    A second line follows the first one. If the line end is lost, the board reads both as one line.
     """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
@@ -87,9 +87,9 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 @pytest.mark.slow
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """Random motions are commanded. In each line, the checksum detects the loss of two characters.
+    """Random motions are commanded. In each line, the checksum detects any loss of two characters.
 
-    For this purpose, the driver avoids certain pairs of characters and certain checksums.
+    This is so because the driver avoids certain pairs of characters and certain checksums.
     """
     chance = random.Random(7)
     for _ in range(150):
@@ -111,13 +111,11 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A stop line, ``rc 2 0 0``, is followed by a second line.
+    """A stop line, ``rc 2 0 0``, and the line after it lose two characters. No motion is made up.
 
-    The line end and the semicolon between the two lines are lost.
-
-    If the checksum of the second line is 92, the board would read the motion ``rc 2 0 092``. The
-    stop line's checksum would not show the damage. Therefore, the driver sends an empty line before
-    such a second line, and the board reads no wrong motion.
+    If the line end and the next semicolon were lost, the board would read one line. With 92 as the
+    checksum of the second line, this would be the motion ``rc 2 0 092``. The stop line's checksum
+    would not show the damage. Therefore, the driver sends an empty line before such a second line.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -129,7 +127,8 @@ def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) 
 def test_what_three_lost_characters_leave() -> None:
     """Three characters of a motion line are lost.
 
-    Less than 1 % of such lines command another motion. The numbers are in docs/boards/fejemis.md.
+    In less than 1 % of these cases, the board reads another motion. The numbers are in
+    docs/boards/fejemis.md.
     """
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
@@ -163,7 +162,7 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
-    """The lines avoid certain digits. Still, the outer wheel reaches every speed within 1.8 %.
+    """The outer wheel reaches every speed within 1.8 %, although the lines avoid certain digits.
 
     Negative speeds are the least exact, because a line with a minus sign also avoids the digit 6.
     """
@@ -176,10 +175,10 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     "volts", [6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25, 1.99, 1.999, -0.1995, -0.1999]
 )
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """A lift line has 45 to 100 % of the requested voltage.
+    """A lift line commands 45 to 100 % of the requested voltage, and may lose characters.
 
-    If the line loses characters, the lift gets at most the voltage of the line, in the direction of
-    the line, and runs no longer than the line says.
+    The lift then gets at most the voltage in the undamaged line, in the same direction. It runs no
+    longer than the undamaged line says.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -201,7 +200,7 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 def test_every_lift_voltage_has_a_robust_line(
     volts: float, longest_s: float, *, forward: bool
 ) -> None:
-    """For each voltage and run time, there is a line whose damage the checksum detects."""
+    """For each voltage and run time, the driver finds a line whose checksum detects damage."""
     text, seconds = lift_line(volts if forward else -volts, longest_s)
     assert robust(text)
     assert seconds <= longest_s
@@ -210,9 +209,9 @@ def test_every_lift_voltage_has_a_robust_line(
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """A line has no characters besides its text, its checksum and the line end.
+    """The driver adds nothing to a line: it has only its text, its checksum and the line end.
 
-    A related firmware obeys ``stop`` only if it is the complete line.
+    The reason is a related firmware, which obeys ``stop`` only if the line contains nothing else.
     """
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
@@ -225,11 +224,11 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 @pytest.mark.slow
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """A motion line without a checksum loses one character. The outer wheel seldom becomes faster.
+    """A motion line without a checksum loses one character.
 
-    It becomes faster only if the character is the decimal point or a digit of the speed. It changes
-    its direction only if the character is the minus sign. The test tries each speed up to 1.1 m/s,
-    in steps of 1 mm/s.
+    The outer wheel becomes faster only if this character is the decimal point or a digit of the
+    speed. It changes its direction only if this character is the minus sign. The test tries each
+    speed up to 1.1 m/s, in steps of 1 mm/s.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):
@@ -246,7 +245,7 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
 
 
 def test_without_sums_the_drive_board_gets_the_speed_of_the_outer_wheel() -> None:
-    """Without checksums, the drive board's line has one speed, and a turn rate of 0."""
+    """Without checksums, the drive board gets the outer wheel's speed, and a turn rate of 0."""
     for speed, turn in ((0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         rim = math.copysign(math.hypot(speed, turn), speed)
         assert plain(plain_drive_line(speed, turn)) == [(2.0, pytest.approx(rim, abs=6e-4), 0.0)]

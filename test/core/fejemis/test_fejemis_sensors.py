@@ -59,9 +59,9 @@ def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
 
 
 def test_an_orientation_without_a_recent_imu_sample_is_not_published() -> None:
-    """The gyro's lines are lost, but the orientations arrive, and are not published.
+    """The lines of the gyro are lost, but orientations still arrive.
 
-    The last turn rate is too old for them.
+    The driver does not publish these orientations, because the last turn rate is too old.
     """
     bench = nominal()
     bench.robot.drive._items["gyro"] = lambda: "lost"
@@ -72,7 +72,7 @@ def test_an_orientation_without_a_recent_imu_sample_is_not_published() -> None:
 
 
 def test_a_low_battery_is_not_told_with_each_message() -> None:
-    """The voltage per cell is low for 4 s. In this time, one notice reports the low battery."""
+    """The voltage per cell is low for 4 s. All messages report this, but only one notice does."""
     bench = nominal(Simulated(volts=20.4))
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low

@@ -38,7 +38,7 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
     twist: tuple[float, float, float], degrees: float
 ) -> None:
-    """Eight twists are converted to steering angles. The angles are those worked out by hand."""
+    """For each of eight twists, the steering angle equals the angle that was worked out by hand."""
     assert math.degrees(ROBOT.steering_rad(BodyTwist(*twist))) == pytest.approx(degrees)
 
 

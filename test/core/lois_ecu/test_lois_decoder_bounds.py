@@ -24,7 +24,8 @@ from omnibot_driver.core.lois_ecu import (
 from omnibot_driver.core.lois_ecu.messages import Report
 
 WHICH = ((True, False), (False, True), (False, False))
-"""Whether lines have checksums, and whether the firmware is the public one."""
+"""Settings of the tests: whether lines have checksums, and whether the firmware is the public
+firmware."""
 SEEDS = int(os.environ.get("LOIS_SEEDS", "1"))
 payloads = st.one_of(st.sampled_from([0, 0xFFFFFFFF, 0x016A016A]), st.integers(0, 2**32 - 1))
 codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
@@ -88,8 +89,8 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
     """A torque sample of 0/0 looks like the end of the record, but more samples follow.
 
-    The decoder continues to read after this sample. The command byte of a torque record differs
-    between firmware and manual. The test uses both bytes.
+    The decoder continues to read after this sample. The test uses both command bytes of a torque
+    record: the manual's one and the firmware's one.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

@@ -52,7 +52,7 @@ def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows()
 
 
 def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
-    """A read is 5 s late. The full buffer contains only the reports of the first second."""
+    """A read is 5 s late. Its reports are from the first second, because the buffer was full."""
     late_reads = listening()
     found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
     assert found[:-1] == about(2.0, 2.2, 2.4, 2.6)
@@ -72,7 +72,7 @@ def test_a_backlog_may_come_in_several_reads() -> None:
 
 
 def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
-    """A GPS report has no clock. The board sends it directly after ticks, so it gets their time."""
+    """A GPS report has no clock. It gets the time of the tick report directly before it."""
     found = read(listening(), 2.4, *ticks(2000), GpsTime(1, 2, 3), *ticks(2200, 2400))
     assert found == about(2.0, 2.0, 2.2, 2.4)
 
@@ -89,7 +89,7 @@ def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
 def test_if_every_read_is_late_the_times_do_not_drift() -> None:
     """An adapter returns three reports every 0.6 s. The board's clock is slow by 0.5 %.
 
-    After 20 min, the last report of each read still has the time of its arrival.
+    Even after 20 min, the last report of each read gets the time at which this read arrives.
     """
     late_reads = listening()
     for number in range(2000):
@@ -102,16 +102,16 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
     """The board restarts while its reports wait to be read. Its clock then begins at zero.
 
-    The time of a later report is that of the last report before the restart plus the board's clock.
+    A report after the restart gets the time of the last report before the restart, plus its clock.
     """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)
 
 
 def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
-    """A clock in ns is near zero after a restart of the board, and every 4.3 s, when it wraps.
+    """A clock in ns is near zero after a restart of the board, and also each time it wraps (4.3 s).
 
-    It is unknown which of the two happened, so the reports get the time of the read.
+    The driver does not know which of the two happened, so the reports get the time of the read.
     """
     late_reads = listening("ns")
     found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))
@@ -200,7 +200,7 @@ def true_pose(bench: Bench) -> Pose:
 def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
     """The driver stalls for seconds during a drive, and then reads all reports at once.
 
-    The pose is right. The twist is plausible: the distance does not count as driven in an instant.
+    The pose is right, and the twist is plausible, although all motion is read in one instant.
     """
     bench = Bench(firmware)
     error_m, _ = stalled_drive(bench, stall_s)
@@ -222,10 +222,9 @@ def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stal
 def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
     firmware: str, twist: BodyTwist, stall_s: float
 ) -> None:
-    """The driver stalls while a wheel rolls backward.
+    """The driver stalls while a wheel rolls backward. The public firmware then counts no ticks.
 
-    The public firmware does not count the ticks of a wheel that rolls backward. The error of the
-    estimated position is less than 6 cm, or less than 3 sigma.
+    The error of the estimated position is below the larger of two limits: 6 cm, and 3 sigma.
     """
     error_m, stddev_m = stalled_drive(Bench(firmware), stall_s, twist)
     assert error_m < max(0.06, 3 * stddev_m)
@@ -258,7 +257,7 @@ def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
 def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: float) -> None:
     """The robot is at rest. Its board restarts during a stall. The pose does not change.
 
-    A board as in the manual has a clock in ns, so only the arrival times show its restart.
+    The manual's board has a clock in ns, so only the arrival times show that it has restarted.
     """
     bench = Bench("documented")
     for _ in range(14):

@@ -175,7 +175,7 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """A record of tick times ends with zeros. The channel with fewer samples is padded with 10.
+    """A record of tick times ends with zeros. Before them, the shorter channel is padded with 10.
 
     The decoder removes the zeros and the padding.
     """
@@ -187,9 +187,9 @@ def test_a_record_of_tick_times_ends_with_zeros() -> None:
 
 
 def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> None:
-    """The public firmware answers a request for torque (0x17) with the byte of tick times (0x04).
+    """The public firmware sends a torque record (0x17) with 0x04, the command byte of tick times.
 
-    The decoder accepts both command bytes.
+    The decoder accepts a torque record with either command byte.
     """
     for code in (b"04", b"17"):
         decoder = LoisDecoder()
@@ -236,6 +236,6 @@ def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
 
 @given(st.binary(max_size=20))
 def test_what_is_not_a_line_is_refused_by_name(data: bytes) -> None:
-    """Any bytes are decoded or raise FrameError, never another exception."""
+    """``decode_command`` accepts any bytes or raises FrameError, never another exception."""
     with suppress(FrameError):
         decode_command(data)

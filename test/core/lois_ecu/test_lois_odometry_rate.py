@@ -14,7 +14,7 @@ PERIOD_S = 0.05
 
 
 def published(board: LoisEcuBoard, now: float) -> bool:
-    """Advance the board's time to ``now``, and return whether odometry was published meanwhile."""
+    """Advance the board's time to ``now``. Return whether this has published odometry."""
     return any(isinstance(reading, OdometryReading) for reading in board.elapse(now))
 
 
@@ -37,7 +37,7 @@ def test_odometry_that_is_late_is_not_published_twice_at_once(
 
 @FIRMWARE
 def test_the_first_odometry_is_published_once(firmware: str) -> None:
-    """The first odometry is published once. The second one is published one period later."""
+    """The first odometry is not published twice. The next one is published one period later."""
     lois = LoisRobot(firmware)
     board, now, times = LoisEcuBoard(LoisEcuSettings()), 1000.0, []
     board.connect()

@@ -20,9 +20,9 @@ def told(*speeds_rpm: float, tuned: bool = False, every_s: float = GROUP_S) -> R
 
 
 def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
-    """The reported speed falls from 31 to 12 RPM, and then 12 RPM is repeated.
+    """The reported speed falls from 31 to 12 RPM. Then the board reports 12 RPM twice more.
 
-    The wheel is at rest.
+    This proves that the wheel is at rest.
     """
     assert told(31, 28, 19, 12).chance == 0.0
     assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
@@ -44,8 +44,8 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
     """The reported speed falls from 60 to 28 RPM, and then the board repeats 28 RPM for long.
 
-    No rolling wheel is so steady, so the wheel is at rest. The 28 RPM are wrong: the board noticed
-    a tick late.
+    No rolling wheel is so steady. So the wheel is at rest, and 28 RPM is a wrong value: the board
+    noticed a tick late.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -63,40 +63,40 @@ def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """The reported speed never fell. The wheel rolls, however often its speed is repeated."""
+    """If the reported speed never fell, the wheel rolls, however often the speed is repeated."""
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The board notices a tick late, so the next tick seems early: it reports 27 instead of 18 RPM.
+    """The board notices one tick late, so it once reports 27 RPM instead of 18 RPM.
 
-    The 18 RPM after this single high speed are not a fall. The wheel has not stopped.
+    The return from 27 to 18 RPM is not taken for a fall, so the wheel is not regarded as at rest.
     """
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """The speed is below 4.5 or above 23.5 RPM, and is repeated three times.
+    """A speed below 4.5 or above 23.5 RPM that is repeated three times does not show rest.
 
-    This does not show rest: few wheels come to rest from such a speed.
+    The reason is that few wheels come to rest from such a speed.
     """
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
 
 def test_another_speed_ends_the_rest() -> None:
-    """A wheel was found to be at rest. Then its reported speed changes, which shows a new tick.
+    """A wheel at rest is no longer regarded as at rest when its reported speed changes.
 
-    The wheel is not at rest any more.
+    The change shows that the board has noticed a new tick.
     """
     assert told(31, 28, 12, 12, 12, 2).chance == 0.0
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """Both wheels have the same speed. The board's reports then do not show how high it is.
+    """Both wheels have the same speed, which the board does not report. It is estimated at 28 RPM.
 
-    The driver estimates 28 RPM. Then the board reports 14 RPM several times. Compared with the
-    estimate, the speed has fallen, so the wheel is at rest.
+    Then the board reports 14 RPM several times. This is a fall, compared with the estimate. So the
+    wheel is at rest.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -109,17 +109,17 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
     """Most reports are lost. In the reports that arrive, the speed falls from 25 to 9 RPM in 1 s.
 
-    The fall seems slow, because a report arrives only every 0.5 s. The driver still concludes that
-    the wheel is at rest.
+    This seems to be a slow fall, because a report arrives only every 0.5 s. But it counts as a
+    fall, so repeated reports of 9 RPM prove that the wheel is at rest.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
 
 
 def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
-    """Most reports are lost. The reported speeds fall by 6 RPM, which is less than usual.
+    """Most reports are lost. The reported speed falls by 6 RPM, which would usually be too little.
 
-    The beginning of the fall may be in a gap, so the wheel is probably at rest.
+    But the beginning of the fall may be in a gap, so the wheel is probably at rest.
     """
     assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
     assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
@@ -129,8 +129,8 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """Most reports are lost. In the reports that arrive, the speed never falls: it rises to 14 RPM.
 
-    The wheel may have slowed down during a gap. So it may be at rest, and many reports of the same
-    speed prove that it is. If no reports are lost, the same speeds are those of a wheel that rolls.
+    The speed may have fallen in a gap. So many reports of the same speed prove that the wheel is at
+    rest. If no reports were lost, they would show that the wheel rolls.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
@@ -141,9 +141,9 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """A busy computer reads three reports at once, 0.4 s after the previous three reports.
+    """A busy computer reads three reports at once, 0.4 s after the three reports before them.
 
-    No report is lost, so a constant speed shows a wheel that rolls.
+    No report was lost in these 0.4 s. So a constant speed shows that the wheel rolls.
     """
     wheel = told(13, 13, 13)
     for _ in range(10):

@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """The driver encodes a speed of 0.2723 m/s as 20 RPM. ``meaning`` decodes a line to a twist."""
+    """``velocity`` encodes 0.2723 m/s as 20 RPM, and ``meaning`` decodes such a line to a twist."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -73,7 +73,7 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
 
 
 def test_duty_is_limited() -> None:
-    """Duty is in percent. Above the limit, both duties are reduced by the same factor."""
+    """If a duty is above the limit (in percent), both duties are reduced by the same factor."""
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
     percent_radps = 1 / (130.0 * 0.13)
     assert ecu.wheels([50 * percent_radps] * 2) == b":01003200323b\n"
@@ -121,9 +121,9 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
     ],
 )
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
-    """The driver sends the request for a record three times, because one may be lost.
+    """The driver sends the request for a record three times, because lines may be lost.
 
-    The requests follow quickly, because each restarts the record.
+    It sends the three requests quickly, because each of them restarts the record.
     """
     ecu = started()
     ecu.record(kind, samples)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Foreign data arrives on the port of a LOIS ECU, and one notice appears."""
+"""Tests of foreign data on the port of a LOIS ECU: one notice appears."""
 
 from random import Random
 

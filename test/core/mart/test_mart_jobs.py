@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of requests other than motion: gyro bias and docking, and the end of a request."""
+"""Tests of jobs, such as docking and the measurement of the gyro bias, and of their ends."""
 
 import pytest
 from mart_bench import MartBench
@@ -20,9 +20,9 @@ def test_the_gyro_is_calibrated_at_rest() -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
-    """With a dead IMU the server would never answer SB, nor any later command.
+    """The IMU is dead. The job fails, and the driver does not send SB.
 
-    So the job fails, and the driver does not send SB.
+    With a dead IMU, the server would not answer SB or any later command.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -78,10 +78,10 @@ def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
 
 @pytest.mark.parametrize("longest_m", [0.2, 0.5, 1.0, 3.0])
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
-    """Without a dock, the robot drives at most the permitted distance.
+    """Without a dock, the robot drives no farther than the permitted distance.
 
-    The server's moves go farther than requested, so the driver requests a shorter distance.
-    Obstacles do not end a docking move.
+    The driver requests less than this distance, because the server's moves go farther than
+    requested. Obstacles do not end a docking move.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))
@@ -102,9 +102,9 @@ def test_a_robot_that_must_not_move_does_not_dock() -> None:
 
 
 def test_docking_ends_with_the_stop_of_its_move() -> None:
-    """The reply to the docking move is lost.
+    """The reply to the docking move is lost. The driver stops the robot, and the job fails.
 
-    The driver stops the robot, and accepts the next job.
+    The driver then accepts the next job.
     """
     bench = MartBench().ready()
     inner = bench.robot.advance

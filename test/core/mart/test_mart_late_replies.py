@@ -33,7 +33,7 @@ def texts(bench: MartBench, since: int = 0) -> list[str]:
 
 
 def once(chosen: Callable[[bytes], bool]) -> Callable[[bytes], bool]:
-    """Return a function that returns True only for the first datagram that ``chosen`` accepts."""
+    """Return a function that returns True once: for the first datagram with ``chosen`` true."""
     seen: list[bytes] = []
 
     def first(data: bytes) -> bool:
@@ -63,8 +63,9 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
     """At the end of a turn, the stop overtakes an encoder query.
 
-    So the angle in the reply to the stop comes before the count. The count is far from the expected
-    angle. The driver neither uses the count as the angle nor learns the motors' speed from it.
+    So the reply to the stop, which contains the angle, comes before the encoder count. The driver
+    does not use the count as the angle: it is far from the expected angle. It also does not learn
+    the motors' speed from the count.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -104,10 +105,10 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """A documented server supports neither SSP (speed of turns) nor RST IMU (check of the IMU).
+    """A server as in the manual refuses SSP (speed of turns) and RST IMU (check of the IMU).
 
-    Each of its refusals arrives twice. The driver does not take the second copy for the reply to
-    the next check of the IMU, so the robot drives.
+    Each refusal arrives twice. The driver does not take the copy of a refusal for the reply to the
+    next check of the IMU, so the robot drives.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -119,9 +120,9 @@ def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
 
 
 def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
-    """The reply to a stopped move arrives twice. The copy arrives before the encoder count.
+    """The reply to a stopped move arrives twice. The copy arrives just before the encoder count.
 
-    The odometry does not use the number in the copy as a count.
+    Both are a number. The odometry does not take the copy for the count.
     """
     bench = on(NetworkFaults(), "firmware")
     network, pilot = bench.robot.network[0].from_board, bench.board._pilot
@@ -147,12 +148,12 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """The robot drives to a goal, and all replies come 0.28 s late.
 
-    After each move, a duplicate of the request may make the robot move a second time. So the driver
-    sends a stop. If there is no duplicate, the server has nothing to stop, and answers the stop
-    sooner. The driver then continues, and the robot reaches the goal.
+    After each move, the driver sends a stop, because the network may have duplicated the request of
+    the move: the robot would then move a second time. Without a duplicate, the server has nothing
+    to stop, and answers the stop sooner. The driver then continues, and the robot reaches the goal.
 
-    ``copied``: whether there is a duplicate. If so, the driver reports it, and adds the first run
-    to the odometry.
+    ``copied``: whether the network duplicates the request. If so, the driver reports it, and adds
+    the first run to the odometry.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""
@@ -173,11 +174,10 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """The late reply to a start arrives after a stop. The driver does not take it for the stop's.
+    """The late reply to a start arrives after a stop. It is not taken for the reply to the stop.
 
-    The driver has taken a copy of the IMU check's ``ok`` for the reply to the start of a backward
-    drive. It stops this drive, but the first stop is lost. Then the true reply to the start
-    arrives.
+    Before, the driver has mistaken a copy of the IMU check's ``ok`` for the reply to the start of a
+    backward drive. It has sent a stop, which was lost. Then the true reply to the start arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]
@@ -209,7 +209,7 @@ def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
 
 
 def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
-    """A lost server answers none of many HELLOs. The driver remembers only the last HELLOs."""
+    """A lost server answers no HELLO. The driver remembers only the last HELLOs that it sent."""
     bench = on(NetworkFaults(lose=1.0), "firmware")
     bench.run(120.0)
     greetings = sum(data == b"HELLO" for _, data in bench.written)
@@ -251,7 +251,8 @@ def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
 ) -> None:
     """The robot drives a curve. From 0.5 s before the stop on, each heading query (RMRA) is lost.
 
-    The encoder shows the driver that the drive is over. The covariance includes the missing turn.
+    The encoder shows the driver that the drive is over. The covariance of the yaw includes the turn
+    that the driver could not measure.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.3, 0.5, 2.5)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A sample of the bounded search that runs the real driver. ``real_search`` runs all trials."""
+"""Some trials of ``real_search``, which is a bounded search with the real driver."""
 
 from collections.abc import Callable
 from random import Random
@@ -22,14 +22,14 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(8))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """In each trial, one datagram is lost, late or doubled, or the IMU dies.
+    """One fault happens in each trial: a datagram is lost, late or doubled, or the IMU dies.
 
-    If a datagram has the fault, the server does not hang, and the robot is at rest at the end. If
-    the IMU dies, no motion begins more than 0.25 s later. At the end, the robot is at rest, or the
-    driver has reported that it has lost the server.
+    If a datagram has a fault, the server does not hang, and the robot is at rest at the end. If the
+    IMU dies, no motion begins more than 0.25 s later. At the end of such a trial, the robot is at
+    rest, or the driver has reported that it has lost the server.
 
-    Each seed is one trial with two wishes of a user. The eight seeds together include each of the
-    four faults, and each wish as the first wish of a trial.
+    Each seed is one trial, in which the user has two wishes one after the other. Among the eight
+    seeds, each of the four faults occurs, and each wish is the first wish of some trial.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))
@@ -49,10 +49,10 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during a forward drive. Its first command that arrives is SL (stop port).
+    """A driver starts during a forward drive. Its first datagram to arrive is SL (stop port).
 
-    After SL has arrived, the driver does not send SRM, the usual stop of a forward drive: SRM would
-    hang the server.
+    Before, the network was interrupted. After SL, the driver does not send SRM, the usual stop of a
+    forward drive: SRM would hang the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
@@ -62,7 +62,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver to send the stops SRM and SM after it has used the stop port.
+    """Patch the driver: after a stop by the stop port, it sends the stops SRM and SM.
 
     Without the patch, the driver first finds out which motion is in progress.
     """
@@ -80,7 +80,7 @@ def says_sl_before_sm(patch: Patch) -> None:
 
 
 def turns_within_rm(patch: Patch) -> None:
-    """Patch the driver to start a turn on the spot (L) during a forward drive, without a stop."""
+    """Patch the driver: from a forward drive, it starts a turn on the spot (L) without a stop."""
     agrees, act = Pilot._agrees, Pilot._act
 
     def spins(pilot: Pilot, now: float) -> bool:
@@ -118,7 +118,7 @@ TRAPS = {
 def test_a_trap_that_is_planted_in_the_pilot_is_found(
     trap: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The real driver passes a trial. With a deliberate defect in the driver, the trial fails."""
+    """A trial passes with the real driver. With a deliberate defect in the driver, it fails."""
     plant, trial, found = TRAPS[trap]
     assert trouble(trial) == ""
     plant(monkeypatch.setattr)

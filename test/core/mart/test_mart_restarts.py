@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a server that is restarted: the driver starts no motion before it is ready."""
+"""Tests of a server that is restarted: the driver starts no motion before the server is ready."""
 
 import math
 from itertools import pairwise
@@ -87,7 +87,7 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
 def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
     boot_s: float, x_m: float, y_m: float, firmware: Firmware
 ) -> None:
-    """The server restarts on the way to a goal, 3 m away. The motors keep their last command.
+    """The server restarts on the way to a goal, 3 m away. The motors keep running.
 
     The driver stops the robot within 5 s after the server has started up.
     """
@@ -137,10 +137,10 @@ def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Fi
 
 
 def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree() -> None:
-    """A documented server is restarted during a move, and the robot still moves.
+    """A server restarts during a move, and the robot still moves.
 
-    The server does not support direct control of the motors (MCS), so the driver stops the robot by
-    a controlled turn.
+    As in the manual, the server has no direct control of the motors (MCS). So the driver stops the
+    robot by a controlled turn of one degree.
     """
     bench = rescued("documented", alive=True)
     assert bench.robot.stands
@@ -175,10 +175,10 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_odometry_goes_on_if_the_server_is_restarted_while_the_robot_drives(
     boot_s: float, motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The server restarts in a drive. It then answers the driver's stop with "no motion".
+    """The server restarts during a drive. It then answers the driver's stop with "no motion".
 
-    The driver does not conclude that the start of the drive was lost. It adds the drive to the pose
-    only once.
+    The driver does not conclude from this answer that the drive never started. It adds the drive to
+    the pose, and adds it only once.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 3.0)
@@ -232,8 +232,8 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 ) -> None:
     """The server restarts in a curve. The motors keep their last command for some seconds.
 
-    The restarted server's relative heading begins at zero, so ``odom`` is wrong by up to 80°. The
-    covariance covers this error.
+    After the restart, the server's relative heading begins at zero. So ``odom`` is wrong by up to
+    80°, and the covariance includes this error.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)
@@ -251,8 +251,8 @@ def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
 ) -> None:
     """Another server answers at the controller's address. Then the controller is started there.
 
-    There is no silence between the two servers. The driver sends nothing that crashes a server that
-    is starting up.
+    There is no silence between the two servers that would show the change. Still, the driver sends
+    nothing that would crash the controller's server while it starts up.
     """
     bench = MartBench("source").ready()
     seconds = 8.0 + offset_s

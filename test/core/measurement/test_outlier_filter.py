@@ -41,7 +41,7 @@ def gate() -> OutlierFilter:
 
 
 def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
-    """Return one list per reading, with what the filter releases when it receives this reading."""
+    """Pass the readings to the filter. For each reading, return a list of what it releases."""
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
         for number, reading in enumerate(readings)
@@ -56,8 +56,7 @@ def trembling(random: Random) -> list[float]:
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
     """Return ``count`` noisy readings of an IMU at rest, with 1 g upward.
 
-    ``leaps``: jumps to add. Keys: number of the reading, then number of the word in it. Value: the
-    jump.
+    ``leaps``: jumps to add, by the number of the reading, and then by the number of the word in it.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
@@ -80,7 +79,8 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 ) -> None:
     """A high bit of one word of a reading is changed, so the word jumps for a single reading.
 
-    This reading is rejected, and the next one is released at once. The ranges are 2 g and 250 °/s.
+    This reading is rejected, and the next one is released at once. The sensor's ranges are 2 g and
+    250 °/s.
     """
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
@@ -105,7 +105,7 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, the force along z and the gyro's values come from another frame.
+    """Some values of one reading belong to another frame: the force along z and the gyro's values.
 
     The filter rejects this reading.
     """
@@ -121,9 +121,9 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """A knock changes one reading by an amount that no single changed bit can cause.
+    """A knock changes one reading. A single changed bit cannot cause a change of this amount.
 
-    The reading is released at once.
+    So the filter releases the reading at once.
     """
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -132,7 +132,7 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
     """A knock saturates the sensor, so the value of one reading is at the end of the scale, 2 g.
 
-    A single changed bit in a usual reading cannot cause this value. So the filter releases the
+    A single changed bit cannot turn a usual reading into this value. So the filter releases the
     reading.
     """
     readings, through = row(60, {}), gate()
@@ -144,7 +144,8 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
     """The value of a bit in m/s² depends on the scale of the sensor (``full_scale_mps2``).
 
-    A reading jumps by the value that a high bit has at the given scale. So the filter rejects it.
+    A reading jumps by the value of a high bit at this scale. So the filter takes the jump for a
+    damaged bit, and rejects the reading.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -180,10 +181,10 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement is faster than 2 m/s or 8 rad/s, so it is rejected.
+    """A displacement is faster than 2 m/s or 8 rad/s. It is rejected, and counts as lost.
 
-    The next displacement reports one more lost displacement: the rejected one. It also reports the
-    losses that the rejected displacement has reported.
+    The next displacement reports this loss. It also reports the losses that the rejected
+    displacement contained.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -192,9 +193,9 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """A displacement is rejected. A pose comes next, and reports the rejected displacement as lost.
+    """A displacement is rejected, so it counts as lost. The pose that comes next reports this loss.
 
-    So the displacement after the pose does not report this loss again.
+    So the displacement after the pose does not report it again.
     """
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
@@ -204,7 +205,7 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
     """A single displacement jumps from 0.25 m/s to 1.5 m/s, and is rejected.
 
-    The pose after it is held until the next displacement shows that the jump is over.
+    A pose follows. The filter holds it until the next displacement shows that the jump is over.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
@@ -224,9 +225,10 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """A displacement jumps. It waits for the next displacement, and the poses after it also wait.
+    """A displacement jumps, so the filter holds it, and also the poses that follow it.
 
-    When ten poses wait, all of them are released.
+    It would hold them until the next displacement. But when it holds ten poses, it releases
+    everything.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
@@ -237,7 +239,7 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
     """A rejected displacement reports a restart of the board, and has an unknown duration.
 
-    The filter passes both facts on: the next displacement has them.
+    The filter passes both facts on with the next displacement.
     """
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
@@ -245,9 +247,9 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """The robot rolls out in a pause. The first displacement after the pause has all this motion.
+    """The robot coasts to a stop in a pause. The first displacement afterwards has all this motion.
 
-    If the robot can drive so far in the pause, the filter accepts this displacement.
+    If the robot can drive so far in the time of the pause, the filter accepts this displacement.
     """
     through = gate()
     through.admit(ahead(), 1.0)
@@ -277,10 +279,10 @@ readings = st.one_of(
 @settings(max_examples=40)
 @given(st.lists(readings, max_size=60))
 def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
-    """Accepted readings keep their order and values.
+    """Accepted readings keep their order and values. Rejected readings are removed.
 
-    A rejected reading is removed. But if it reports losses, a restart or an unknown duration, a
-    later reading reports them.
+    If a rejected reading reports losses, a restart or an unknown duration, a later reading reports
+    this instead.
     """
     through = gate()
     came = list(chain(*admitted(given, through)))
@@ -306,7 +308,10 @@ def bare(reading: Reading) -> Reading:
 
 
 def test_two_displacements_that_came_with_one_read_are_believed() -> None:
-    """Two displacements from one read have the same time. This causes no division by zero."""
+    """Two displacements come from one read, so there is no time between them.
+
+    The filter accepts both, and does not divide by zero.
+    """
     through = gate()
     assert through.admit(ahead(), 1.0) == [(ahead(), 1.0)]
     at_once = replace(ahead(), duration_s=0.0)
@@ -315,10 +320,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor sends text instead of binary words, so its full scale is set to infinity.
+    """A sensor sends text, so damage cannot change a single bit of a value.
 
-    Damage cannot change single bits of a value. A knock that changes one reading is released at
-    once.
+    Its full scale is set to infinity for this reason. A knock that changes one reading is released
+    at once.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]

@@ -16,7 +16,7 @@ def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> Displa
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements are missing. The one before them has 0.5 m/s, the one after them 1 m/s.
+    """Four displacements are missing. The speed is 0.5 m/s before this gap, and 1 m/s after it.
 
     For each missing displacement, the estimate is the mean, 0.75 m/s.
     """
@@ -42,7 +42,7 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
     """The robot drives a curve with a constant twist. Displacements in earth axes are missing.
 
-    The estimated motion of the gap is exact.
+    The motion that is estimated for the missing displacements is exact.
     """
     bridge, trip = GapInterpolation(), Trip(0.7)
     bridge.tangents(trip.move(0.02, 0.01, 0.1), 0.7)

@@ -81,7 +81,7 @@ def test_the_twist_is_the_true_one() -> None:
 def test_what_has_rolled_is_the_true_way() -> None:
     """The board assumes wrong sizes of its wheels and its base.
 
-    With the right odometry scales, the distance that the robot has rolled is right, within 2 mm.
+    The odometry scales correct this: the distance that the robot has rolled is right within 2 mm.
     The joint angles are computed from this distance.
     """
     on = bench(TRUE)

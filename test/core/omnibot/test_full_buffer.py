@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a reader that is so late that the kernel's buffer fills up, and later bytes are lost."""
+"""Tests of reads that are so late that the kernel's buffer is full, and later bytes are lost."""
 
 import math
 
@@ -44,9 +44,9 @@ def test_motion_that_the_full_buffer_lost_is_in_odom_whatever_the_counter_shows(
 ) -> None:
     """The reader stalls for seconds while the robot drives.
 
-    The first bytes arrive in one read or in three, and the following bytes are lost. The counter of
-    the next delta may be small, as after a restart of the board, but the board has not restarted.
-    In all cases, odom is the board's pose again a second later.
+    The kernel's buffer keeps the first bytes, which arrive in one read or in three. Later bytes are
+    lost. The counter of the next delta may be small, as after a restart of the board, but the board
+    has not restarted. In all cases, odom agrees with the board's pose a second later.
     """
     bench = Bench(BoardSettings(seed=3, running=True))
     bench.open()

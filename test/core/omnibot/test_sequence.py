@@ -22,7 +22,7 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """Up to 1000 deltas are lost, and the next delta comes up to 0.4 s early or late.
+    """Up to 1000 deltas are lost. The next delta comes up to 0.4 s too early or too late.
 
     The lost deltas are counted correctly, although the counter wraps.
     """
@@ -43,8 +43,8 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
     """The board is paused, and then continues with the next count. No delta is counted as lost.
 
-    The duration of the first delta is unknown. If the next count is 0 (after 255), the driver
-    assumes a restart, because a restarted board begins at 0.
+    The duration of the first delta after the pause is unknown. If its count is 0 (after 255), the
+    driver assumes a restart, because a restarted board begins at 0.
     """
     sequence = begun(count)
     sequence.pause()
@@ -109,8 +109,8 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
     """A false delta has a count near zero, as after a restart.
 
-    The next true delta continues the old count, so the board has not restarted. The supposed
-    restart is withdrawn, even if the counter has wrapped before.
+    The next true delta continues the old count. This shows that the board has not restarted, even
+    if the counter has wrapped in between. The supposed restart is withdrawn.
     """
     sequence = begun(88)
     passed = 1 + 256 * wraps
@@ -122,7 +122,7 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
     """A pose comes after every fifth delta. The counter of a pose shows that three deltas are lost.
 
-    The next delta does not count these losses again.
+    The pose reports these losses. So the next delta does not report them again.
     """
     sequence = Sequence()
     for count in range(10):
@@ -154,8 +154,8 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
     """Deltas are lost for more than 1 s. Then a pose arrives before the next delta.
 
-    The counter of the pose shows the losses. By chance, five times this counter may be near the
-    count of the last delta, as after a restart. After such a long gap, no restart is assumed.
+    The pose's counter shows the losses. By chance, the counters of pose and deltas may fit together
+    as after a restart. After such a long gap, no restart is assumed.
     """
     sequence = Sequence()
     for count in range(300):
@@ -190,7 +190,7 @@ def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
     """The board restarts. By chance, its count 0 also fits the last count and the elapsed time.
 
-    The next pose also has the count 0, which shows the restart.
+    The counter of the next pose is also 0. This shows the restart.
     """
     sequence = Sequence()
     for count in range(206):
@@ -207,7 +207,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
     """The board sends a pose after every second delta, not after every fifth.
 
-    The count in a pose then does not tell whether deltas were lost.
+    The counter of a pose then does not show whether deltas were lost.
     """
     sequence = Sequence()
     for count in range(20):
@@ -252,9 +252,9 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """The host's clock stops while 100 deltas are lost, so the next count seems far too high.
+    """100 deltas are lost while the host's clock stops. So the next count seems far too high.
 
-    The driver counts the losses only when the following delta confirms this count.
+    The driver counts these losses only after the following delta has confirmed this count.
     """
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
@@ -274,9 +274,9 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """A delta is lost. The decoder returns the next pose and delta late and almost together.
+    """A delta is lost. The next pose and the next delta are decoded late, almost at the same time.
 
-    The pose shows the lost delta, so the next delta does not count it again.
+    The pose reports the lost delta, so the next delta does not report it again.
     """
     sequence = Sequence()
     for count in range(11):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the diagnostics: each fault raises its own status, which returns to OK in time."""
+"""Tests of the diagnostics: each fault changes its own status, which later returns to OK."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -173,7 +173,7 @@ HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 def test_what_happened_is_told_for_a_while_and_then_forgotten(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """An event changes a status for some time. Then the status is OK again."""
+    """An event is shown in one status for some time. Then this status is OK again."""
     robot = Robot()
     fault(robot)
     robot.seconds(round(RECENT_S) - 1)
@@ -214,7 +214,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     """The clock skew is larger than that of any crystal. The driver reports this only after 70 s.
 
-    A busy computer may cause an equally large skew for a minute.
+    It waits for so long because a busy computer may cause an equally large skew for a minute.
     """
     robot = Robot()
     robot.set(skew_ppm=-119.0)
@@ -249,9 +249,9 @@ def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     ],
 )
 def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str, Level]) -> None:
-    """The board is in some state other than nominal. Statuses without data have the level "stale".
+    """In each state except nominal, the statuses have the levels that belong to this state.
 
-    In IMU-only mode, displacements are not expected.
+    Statuses without data have the level "stale". In IMU-only mode, displacements are not expected.
     """
     robot = Robot()
     robot.set(state=state)
@@ -298,9 +298,9 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """The board sends no IMU readings and no poses. The diagnostics have no rates of these.
+    """The board sends no IMU readings and no poses.
 
-    They also have no status "IMU".
+    So the diagnostics have no rates of IMU readings and poses, and no status "IMU".
     """
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An adapter holds data back for seconds, loses what exceeds its buffer, and recovers."""
+"""Tests of an adapter that holds data back for seconds, overflows, and then recovers."""
 
 import math
 from itertools import pairwise

@@ -44,9 +44,9 @@ def test_the_body_moves_by_the_equations_of_the_manual(
 
 
 def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
-    """``rc`` commands a turn on the spot.
+    """``rc`` commands a turn on the spot, so the front wheel goes to 90°.
 
-    With its front wheel at 90°, the robot turns five times as fast.
+    The robot then turns five times as fast as commanded.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 4.0)
@@ -97,9 +97,9 @@ def test_no_command_ends_by_itself() -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
-    """The robot drives a curve in reverse, with firmware that mirrors reverse drives.
+    """The firmware mirrors reverse drives: it steers as for the same curve in forward direction.
 
-    The front wheel is steered as for the same curve forward.
+    The robot drives a curve in reverse, and turns as commanded.
     """
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
@@ -115,9 +115,9 @@ def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
-    """``rc`` commands reverse motion. The firmware limits the angle of the front wheel.
+    """``rc`` commands reverse motion, and the firmware limits the angle of the front wheel.
 
-    The front wheel turns to 90°, so the robot spins, against the commanded turn.
+    The front wheel goes to this limit, 90°. So the robot spins, and in the wrong direction.
     """
     rig = Rig(firmware=Firmware(sums=False, reverse="clamped")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)

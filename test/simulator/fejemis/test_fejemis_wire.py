@@ -123,9 +123,9 @@ def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
 
 
 def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
-    """The host subscribes to a message of the front Teensy, which does not acknowledge this.
+    """The host subscribes to a message of the front Teensy. The Teensy does not acknowledge it.
 
-    The Teensy sends the message periodically until the host sets the period to zero.
+    It sends the message periodically until the host sets the period to zero.
     """
     rig = Rig().booted()
     assert rig.ask(FRONT, "sub fwl 15") == []
@@ -157,9 +157,9 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """Each value can be requested once, or subscribed to, by its key in the help text.
+    """Each value has a key in the help text, by which the host requests it or subscribes to it.
 
-    Each reply begins with its key. Only the reply to ``ir`` begins with ``irc``.
+    Each reply begins with the key, with one exception: the reply to ``ir`` begins with ``irc``.
     """
     rig = Rig().booted()
     rig.say(port, "leave")
@@ -287,8 +287,8 @@ def test_the_two_clocks_run_apart() -> None:
 def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
     """The clock of one Teensy is fast, that of the other Teensy is slow.
 
-    Each Teensy sends a heartbeat every 0.4 s by its own clock.
-    So the time in a heartbeat is right within a millisecond, the duration of a cycle.
+    Each Teensy sends a heartbeat every 0.4 s by its own clock. So by this clock, each heartbeat
+    comes in time, within a millisecond, the duration of a cycle.
     """
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.1)

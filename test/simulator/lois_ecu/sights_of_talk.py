@@ -45,7 +45,7 @@ def with_sum(text: bytes) -> bytes:
 
 
 def extra_settings(quirks: Quirks) -> bool:
-    """Return whether the feed-forward setting exists: with Kp = 0, it alone turns the wheel."""
+    """Return whether the feed-forward setting exists: it turns the wheel although Kp is 0."""
     rig = Rig(replace(quirks, low_pass_starts_at_zero=False))
     rig.run(2.1)
     for setting in (Setting.LEFT_KP, Setting.RIGHT_KP):
@@ -56,12 +56,12 @@ def extra_settings(quirks: Quirks) -> bool:
 
 
 def appends_odometry(quirks: Quirks) -> bool:
-    """Return whether the messages 0x12 contain the odometry."""
+    """Return whether messages 0x12 contain the odometry, too, and not only ticks."""
     return any(group.appended for group in odometry_in(Rig(quirks).run(4.0)))
 
 
 def clock_in_ms(quirks: Quirks) -> bool:
-    """Return whether the driver's decoder finds that the board's times are in ms, not in ns."""
+    """Return whether the board's times are in ms, not in ns, as the driver's decoder finds."""
     rig = Rig(quirks)
     rig.run(6.0)
     return rig.decoder.clock_unit == "ms"
@@ -81,7 +81,7 @@ def clock_stops_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_sending(quirks: Quirks) -> bool:
-    """Return whether the board loses more than 2 of 150 lines that are each sent once."""
+    """Return whether the board loses more than 2 of 150 lines. Each line is sent only once."""
     rig = Rig(quirks)
     rig.run(2.1)
     for number in range(150):
@@ -106,7 +106,7 @@ def deaf_while_counting(quirks: Quirks) -> bool:
 
 
 def button_waits_while_sending(quirks: Quirks) -> bool:
-    """Return whether the button does not cut the power while the board sends a record."""
+    """Return whether the button cannot cut the motors' power while the board sends a record."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(50, 50), RecordTorque(100, 100))
@@ -130,7 +130,7 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
     """Return whether command 0x11, which sets the terminal mode, sets ``short_correction`` to zero.
 
-    In this test, the command sets the mode that is already set.
+    The test sends the command with the mode that the board already has.
     """
     rig = Rig(quirks)
     rig.run(2.1)
@@ -174,8 +174,8 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
     """Return whether the board delivers only one ball in six seconds.
 
-    With this quirk, it ignores a request that directly follows another request, but obeys a request
-    6 s later.
+    With this quirk, the board ignores a second request directly after the first one. It obeys a
+    request 6 s later.
     """
     rig = Rig(quirks)
     rig.run(2.1)
@@ -196,7 +196,7 @@ def reset_clears_ticks_only(quirks: Quirks) -> bool:
 
 
 def gps_is_ignored(quirks: Quirks) -> bool:
-    """Return whether the reported position is latitude 0, longitude 0."""
+    """Return whether the board reports the position latitude 0, longitude 0."""
     return GpsPosition(0.0, 0.0) in Rig(quirks).run(4.0)
 
 
@@ -245,16 +245,16 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """Return whether a record of 3 headings is not sent after the third sample."""
+    """Return whether a record of 3 headings still has not come after the third sample."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None
 
 
 def large_records_never_end(quirks: Quirks) -> bool:
-    """Return whether a record of the times of 1025 ticks is never sent.
+    """Return whether a record of the times of 1025 ticks never comes.
 
-    The drive is so long that both wheels turn by more than 1025 ticks, of 120 per turn.
+    Both wheels turn by more than 1025 ticks, at 120 ticks per turn.
     """
     rig = Rig(quirks, steps=120)
     rig.run(2.1)
@@ -279,9 +279,9 @@ def lenient_hex(quirks: Quirks) -> bool:
 
 
 def slow_boot(quirks: Quirks) -> bool:
-    """Return whether the board, in the first 2 s after power-up, sends nothing and obeys nothing.
+    """Return whether the board sends nothing and obeys nothing in the first 2 s after power-up.
 
-    The board does not lose a command from this time: it obeys the command afterwards.
+    A command that arrives in these 2 s is not lost: the board obeys it afterwards.
     """
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))

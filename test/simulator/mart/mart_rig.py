@@ -43,7 +43,7 @@ class Rig:
         self.server.receive(text.encode("latin-1"), STOP, "us", self.now)
 
     def run(self, seconds: float) -> list[str]:
-        """Advance by ``seconds``, and return the replies received in that time."""
+        """Advance by ``seconds``, and return the replies that the server has sent in this time."""
         found = self.server.advance(self.now + seconds)
         self.replies += [(reply.at_s, reply.data) for reply in found]
         return [reply.data.decode("latin-1") for reply in found]
