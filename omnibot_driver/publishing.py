@@ -186,14 +186,14 @@ class Publishing:
     def _end(self) -> None:
         """Record that ROS is shutting down, so that later events are not published.
 
-        ROS calls this method. It would take too much time to ask ROS for each event.
+        ROS calls this method. It would take too much time to ask ROS at each event instead.
         """
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Record whether the node's time is simulated. ROS calls this method when this changes.
+        """Record whether the node's time is simulated. ROS calls this method at each change.
 
-        It would take a microsecond more for each event to ask ROS.
+        It would take a microsecond more for each event to ask ROS instead.
         """
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 

@@ -139,7 +139,7 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
     """The parameter descriptions say about an IMU only what is true for the board.
 
-    ``~/calibrate_gyro`` measures ``gyro_bias``, and the description of ``gyro_bias`` says so. If
+    Usually, the description of ``gyro_bias`` says that ``~/calibrate_gyro`` measures this bias. If
     the board itself subtracts the bias, the description must not say this. The noise of an IMU is
     quoted only in the parameter table of the OmniBot.
     """

@@ -27,7 +27,10 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
 
 
 def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
-    """A file that is missing or empty contains no calibration. A save makes its folder."""
+    """A missing file or an empty file contains no calibration.
+
+    A save also makes the folder of the file.
+    """
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})

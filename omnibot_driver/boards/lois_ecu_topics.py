@@ -177,8 +177,7 @@ class LoisEcuTopics:
         return float(self._values["cmd_vel_timeout"])
 
     def _drive(self, session: Session, message: Float32MultiArray, now: float) -> None:
-        """Convert the message's motor duties, in percent, to wheel rates, and command these
-        rates."""
+        """Convert the message's motor duties (in percent) to wheel rates; command these rates."""
         duties = list(message.data)
         require_finite("duty_cmd", duties)
         if len(duties) != 2:

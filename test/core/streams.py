@@ -20,7 +20,7 @@ BYTE_S = 10 / 115200
 REST = ImuFrame((120, -80, -16384), (1, 2, 3))
 HEADER_BYTES = b"\xff\xfa\xfb\xfc"
 LEAD_IN = encode(REST) * 2
-"""Enough frames to synchronize a decoder, without bytes that look like a header."""
+"""Frames that are enough to synchronize a decoder. They have no bytes that look like a header."""
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:

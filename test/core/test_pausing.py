@@ -153,10 +153,10 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """The board does not receive P, so the pause fails. The driver then refuses motion.
+    """The board does not receive P, so the pause fails.
 
-    It refuses motion until ~/start. It also repeats the pause: when the board receives again, it is
-    paused.
+    The driver then refuses motion until ~/start. It also repeats the pause, so the board is paused
+    when it receives again.
     """
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)

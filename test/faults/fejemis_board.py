@@ -71,7 +71,8 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 def half_restarts(half: str) -> Any:
     """Make a case in which one Teensy (``half``) restarts.
 
-    No commands are sent after the restart, because a restarted Teensy would obey them at once.
+    The commands end before the restart. Otherwise the restarted Teensy would obey the next command
+    at once.
     """
 
     def case(rig: Rig) -> None:

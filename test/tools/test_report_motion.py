@@ -93,9 +93,9 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """The odometry has a gap. The report does not regard the gap as a standstill.
+    """The odometry has a gap, and the robot may turn during the gap.
 
-    The robot may turn during the gap.
+    So the report does not regard the gap as a standstill.
     """
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
@@ -128,7 +128,10 @@ def of_a_fejemis(drive: Drive) -> Log:
 
 
 def test_the_upright_sensor_of_a_fejemis_is_good(drive: Drive) -> None:
-    """The IMU of a Fejemis stands upright, as the robot's description says. This is good."""
+    """The IMU of a Fejemis stands upright, as the description of the robot says.
+
+    The report calls this good.
+    """
     found = judge(of_a_fejemis(drive))
     assert all(finding.level <= Level.NOTE for finding in found)
     (turns,) = [finding for finding in found if "by the gyro" in finding.text]
@@ -251,10 +254,7 @@ def test_motion_under_a_latched_estop_is_found_without_any_command(drive: Drive)
 
 
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
-    """The pose jumps by 0.5 m, which the twist does not explain.
-
-    The level of this finding is BAD.
-    """
+    """The pose jumps by 0.5 m, but the twist shows no such motion. The report calls it BAD."""
     drive.odom.values[300:, 0] += 0.5
     (leap,) = troubles(drive)
     assert leap.level is Level.BAD

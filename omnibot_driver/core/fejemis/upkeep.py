@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Makes both boards send data, configures them, and runs the user's requests other than motion.
+"""Makes both boards send data, configures them, and carries out requests other than motion.
 
 The module combines subscriptions, polls, configuration, jobs, brush, lift and lights.
 """
@@ -76,7 +76,7 @@ class Upkeep:
     def geometry(self) -> Geometry:
         """Track and wheelbase in m, as the drive board uses them.
 
-        Until the board has reported them, they come from the settings.
+        They come from the settings until the board has reported its own values.
         """
         nominal = Geometry(self._settings.track_m, self._settings.wheelbase_m)
         return self.configurations["drive"].geometry or nominal

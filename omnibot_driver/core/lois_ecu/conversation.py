@@ -270,8 +270,8 @@ class LoisConversation:
     def emergency_stop(self) -> bytes:
         """Return the set-points RPM 0/0; in a terminal mode, return no bytes.
 
-        In a terminal mode, the public firmware reads at most 480 characters a second. So the driver
-        then stops the robot with the Stop (``stop``) alone.
+        In a terminal mode, the public firmware reads at most 480 characters a second. So in this
+        mode, the driver sends only the Stop (``stop``), and no set-points.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 

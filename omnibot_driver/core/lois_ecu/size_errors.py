@@ -57,7 +57,8 @@ class SizeErrors:
     def covariance(self, yaw_rad: float) -> Covariance:
         """Return the covariance of the pose in a coordinate frame in which its yaw is ``yaw_rad``.
 
-        The paths are computed in another frame. The two frames may differ by a constant rotation.
+        The copies of the path are computed in another frame. The two frames may differ by a
+        constant rotation.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

@@ -19,9 +19,10 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 
 PIECE: Final = 512
 QUIET_S: Final = 1.0
-"""Time in s that the driver waits for a further piece of a file. Then it expects no more pieces.
+"""Time in s that the driver waits for a further piece of a file. After this time without a piece,
+it expects no more pieces.
 
-After it has received all bytes of the file, it waits for only a third of this time.
+If it has received all bytes of the file, it waits for only a third of this time.
 """
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn. The robot is at rest while the driver waits.

@@ -31,10 +31,10 @@ class Moment:
 
     @property
     def spread_s(self) -> float:
-        """Time from the earliest to the latest possible measurement, in s."""
+        """Time in s from the earliest to the latest possible time of the measurement."""
         return self.until_s - self.from_s
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether the measurement may be old, or the reply may answer another query."""
+        """Whether the time of the value is uncertain, or the reply may answer another query."""
         return self.doubtful or self.spread_s >= UNCERTAIN_S

@@ -85,9 +85,9 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
     """Take a sample of the gyro bias, before a motion or for the bias measurement SB.
 
-    ``left``: number of samples still to take. ``missed``: number of failed samples in a row.
-
-    After the last sample, start the motion ``kind``; if ``kind`` is None, answer SB.
+    ``left``: number of samples still to take. ``missed``: number of samples in a row that have
+    failed. ``kind``: the motion that starts after the last sample; if None, the server answers SB
+    instead.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0

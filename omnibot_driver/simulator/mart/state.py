@@ -160,7 +160,7 @@ class ServerState:
 
     @property
     def heading_integrates(self) -> bool:
-        """Whether the relative heading that the server reports follows a turn of the robot now."""
+        """Whether the server now changes the relative heading when the robot turns."""
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:

@@ -34,10 +34,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand: names of driver parameters, and a text such as "an IMU".
+"""For each subcommand: names of driver parameters, and a text for the error message.
 
-The subcommand works only if the driver has at least one of these parameters. If it has none, an
-error message says what the board does not have, in the words of the text.
+The subcommand works if the driver has at least one of these parameters. Otherwise, the error
+message contains the text as what the board does not have, such as "an IMU".
 """
 
 

@@ -67,7 +67,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
 def _messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """Yield the messages up to the first error in the bag. Add its text to ``troubles``."""
+    """Yield the messages up to the first error in the bag; add this error to ``troubles``."""
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return

@@ -50,9 +50,9 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """Displacements arrive only every 0.4 s, and the first may have begun before Stop.
+    """If displacements arrive only every 0.4 s, the proof of rest takes longer than usual.
 
-    The proof of rest therefore takes longer than with frequent displacements.
+    The first displacement after Stop may have begun before Stop, so it proves nothing.
     """
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
@@ -105,7 +105,7 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """After a drive, ``owed`` is true: the driver still needs a proof of rest.
+    """After a drive, ``owed`` is true: a proof of rest is still needed.
 
     Only displacements of zero give this proof; a new connection or a Stop does not.
     """

@@ -70,7 +70,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
 def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
-    """After a stall of the driver, it reports only boards as silent that still send nothing."""
+    """After a stall, the driver calls a board silent only if the board still sends nothing."""
     bench = nominal()
     bench.drive_on()
     bench.now += 3.0
@@ -169,9 +169,9 @@ def test_boards_that_only_change_their_ports_have_not_restarted() -> None:
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
-    """The two boards do not form a pair, for example because both are drive boards.
+    """The two boards do not form a pair; for example, both are drive boards.
 
-    A notice says so once. Motion is refused.
+    One notice reports this, and motion is refused.
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()

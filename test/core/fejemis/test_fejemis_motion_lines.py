@@ -111,11 +111,12 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A stop line, ``rc 2 0 0``, and the line after it lose two characters. No motion is made up.
+    """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
 
-    If the line end and the next semicolon were lost, the board would read one line. With 92 as the
-    checksum of the second line, this would be the motion ``rc 2 0 092``. The stop line's checksum
-    would not show the damage. Therefore, the driver sends an empty line before such a second line.
+    If the line end and the next semicolon were lost, the board would read both as one line. With 92
+    as the checksum of the second line, this would be the motion ``rc 2 0 092``. The stop line's
+    checksum would not show the damage. Therefore, the driver sends an empty line before such a
+    second line.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)

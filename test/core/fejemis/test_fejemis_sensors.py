@@ -72,7 +72,7 @@ def test_an_orientation_without_a_recent_imu_sample_is_not_published() -> None:
 
 
 def test_a_low_battery_is_not_told_with_each_message() -> None:
-    """The voltage per cell is low for 4 s. All messages report this, but only one notice does."""
+    """The voltage per cell is low for 4 s, in many messages. Only one notice reports this."""
     bench = nominal(Simulated(volts=20.4))
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low

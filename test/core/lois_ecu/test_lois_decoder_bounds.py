@@ -105,7 +105,7 @@ def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> No
 
 
 def test_a_record_without_end_is_not_kept() -> None:
-    """A record has no end. The decoder holds at most the requested number of samples."""
+    """A record never ends. The decoder holds at most the requested number of samples."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 10, 10)
     decoder.feed(b":04000a000b3d\n" * 5000, 0.0)

@@ -102,7 +102,8 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
     """The board restarts while its reports wait to be read. Its clock then begins at zero.
 
-    A report after the restart gets the time of the last report before the restart, plus its clock.
+    The time of a later report is a sum: the time of the last report before the restart, plus the
+    board's clock in the later report.
     """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)
@@ -129,7 +130,7 @@ def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
 def test_times_never_decrease_and_are_not_after_the_arrival(
     told: list[tuple[int, float, bool]], unit: ClockUnit
 ) -> None:
-    """The times that the reports get never decrease, and are not after the arrival.
+    """The times that reports get never decrease, and are never later than the time of the read.
 
     This is true for any values of the board's clock, and for reports that are read at any times.
     """

@@ -129,8 +129,8 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """Most reports are lost. In the reports that arrive, the speed never falls: it rises to 14 RPM.
 
-    The speed may have fallen in a gap. So many reports of the same speed prove that the wheel is at
-    rest. If no reports were lost, they would show that the wheel rolls.
+    The speed may have fallen in a gap. If 14 RPM is then reported many times, this proves that the
+    wheel is at rest. Without lost reports, it would show that the wheel rolls.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

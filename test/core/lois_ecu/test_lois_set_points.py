@@ -25,7 +25,7 @@ def started(settings: LoisEcuSettings | None = None) -> LoisConversation:
 
 
 def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
-    """Stop is the line of duty zero, and the e-stop is the line of RPM zero."""
+    """Stop is encoded as the line for duty zero, and the e-stop as the line for RPM zero."""
     ecu = LoisConversation(LoisEcuSettings())
     assert ecu.stop() == STOP
     assert ecu.emergency_stop() == CLEAR

@@ -176,8 +176,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     """The late reply to a start arrives after a stop. It is not taken for the reply to the stop.
 
-    Before, the driver has mistaken a copy of the IMU check's ``ok`` for the reply to the start of a
-    backward drive. It has sent a stop, which was lost. Then the true reply to the start arrives.
+    This happens as follows. The driver mistakes a copy of the IMU check's ``ok`` for the reply to
+    the start of a backward drive. It sends a stop, which is lost. Then the true reply to the start
+    arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

@@ -227,7 +227,7 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
     """A displacement jumps, so the filter holds it, and also the poses that follow it.
 
-    It would hold them until the next displacement. But when it holds ten poses, it releases
+    Usually it holds them until the next displacement. But when ten poses are held, it releases
     everything.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
@@ -362,8 +362,8 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
     """A board's own odometry corrects itself by a step that is too large for any robot.
 
-    A filter with ``corrected=True`` releases the step, with ``measured=False`` and
-    ``possible=False``. It rejects only a step that contains NaN or infinity.
+    A filter with ``corrected=True`` releases this step, marked with ``measured=False`` and
+    ``possible=False``. It rejects a step only if it contains NaN or infinity.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion during a gap, estimated from the displacements before and after it."""
+"""Tests of gap interpolation: the displacements before and after a gap show the motion in it."""
 
 import pytest
 from synthetic_board import PERIOD_S, Trip, body, xyyaw

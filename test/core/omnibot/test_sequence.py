@@ -55,10 +55,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 @pytest.mark.slow
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """After a pause, either the board has restarted, or it ran on and deltas were lost.
+    """After a pause, either the board has restarted, or it has continued and deltas were lost.
 
-    The driver computes for both cases how many deltas were lost, and assumes the case with fewer.
-    If the numbers are equal, it assumes a restart.
+    The driver computes the number of lost deltas for both cases, and assumes the case in which
+    fewer are lost. If the numbers are equal, it assumes a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -69,9 +69,9 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """A delta has the count 0 two seconds after the last delta. The board has restarted.
+    """A delta has the count 0 two seconds after the last delta, so the board has restarted.
 
-    Without a restart, the count would not be 0 after this time.
+    Without a restart, the count could not be 0 after this time.
     """
     assert begun(count).delta(0, 102.0).restarted
 
@@ -154,8 +154,8 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
     """Deltas are lost for more than 1 s. Then a pose arrives before the next delta.
 
-    The pose's counter shows the losses. By chance, the counters of pose and deltas may fit together
-    as after a restart. After such a long gap, no restart is assumed.
+    The pose's counter shows the losses. By chance, it may fit the last delta's count as it does
+    after a restart. But after such a long gap, no restart is assumed.
     """
     sequence = Sequence()
     for count in range(300):
@@ -291,9 +291,9 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """A delta has the count 0 after 3 s of silence. The board has restarted.
+    """A delta has the count 0 after 3 s of silence, so the board has restarted.
 
-    Without a restart, the count would not be 0 after this time.
+    Without a restart, the count could not be 0 after this time.
     """
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)

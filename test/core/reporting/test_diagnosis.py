@@ -214,7 +214,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     """The clock skew is larger than that of any crystal. The driver reports this only after 70 s.
 
-    It waits for so long because a busy computer may cause an equally large skew for a minute.
+    It waits, because a busy computer may cause an equally large skew for a minute.
     """
     robot = Robot()
     robot.set(skew_ppm=-119.0)

@@ -56,7 +56,7 @@ def extra_settings(quirks: Quirks) -> bool:
 
 
 def appends_odometry(quirks: Quirks) -> bool:
-    """Return whether messages 0x12 contain the odometry, too, and not only ticks."""
+    """Return whether the board also sends its odometry as messages 0x12."""
     return any(group.appended for group in odometry_in(Rig(quirks).run(4.0)))
 
 
