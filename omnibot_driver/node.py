@@ -232,7 +232,7 @@ class OmniBotDriver(Node):
         session.command_pose(messages.goal_pose(goal, frame), now)
 
     def _look_around(self) -> None:
-        """Warn once of each mistake that ROS does not report, such as two nodes with one name."""
+        """Warn once of each mistake that ROS does not report, e.g. two nodes with the same name."""
         for look in list(self._looks):
             if warning := look():
                 self.get_logger().warning(warning)

@@ -58,7 +58,8 @@ class Outbox:
     def deliver(self) -> None:
         """Make the queued calls. If another thread is making calls, leave them to that thread.
 
-        If the queue is full, wait for that thread first. Raises the exceptions of the calls.
+        But if the queue is full, wait until that thread is done, then make the calls that are left.
+        Raises the exceptions of the calls.
         """
         waiting, delivering = self._waiting, self._delivering
         while waiting:  # checked again after the release, for calls that were put meanwhile

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``Inbound.process``: when nothing is left to do, and which data answers a request."""
+"""Tests of ``Inbound.process``: what its result False means, and which data answers a request."""
 
 from contextlib import suppress
 

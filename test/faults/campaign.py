@@ -149,7 +149,7 @@ class Campaign(Outcome):
         return self.rows[-1]
 
     def faults_of_the_line(self) -> None:
-        """Run all faults of the line, once in each round. One driver goes through all of them."""
+        """Run all faults of the line in each of the rounds, all with the same driver."""
         self._one_life(Rig, self._kind.cases or survivable, damaged_bytes=True)
 
     def faults_of_the_network(self) -> None:

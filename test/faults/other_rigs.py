@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Rigs for two other boards: one behind a network, and one under position control."""
+"""Rigs for two special boards: one behind a network, and one under position control."""
 
 import socket
 from pathlib import Path

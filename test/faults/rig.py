@@ -282,9 +282,9 @@ class Rig:
         self.expect_still(self.line.tick, "afterwards")
 
     def judge_stream(self, damaged_bytes: bool = False) -> None:
-        """Expect that the board has sent every published message, and that odometry does not jump.
+        """Expect that the driver has published only what the board sent.
 
-        Also check that timestamps increase, and that the driver rejected no readings.
+        Also expect that odometry does not jump, timestamps increase, and no reading is rejected.
 
         ``damaged_bytes``: if True, a few wrong messages and rejected readings are allowed.
         """

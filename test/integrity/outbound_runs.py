@@ -23,7 +23,7 @@ from outbound_trial import BoardKind, Memo, Trial
 from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 
 SCRIPTS: Final = 6
-"""Number of scripts for each scene. Each script has other commands."""
+"""Number of scripts for each scene. The commands differ from script to script."""
 NEEDED: Final = 10_000
 """Least number of trials for each kind of receiver and each rate of lost bytes.
 

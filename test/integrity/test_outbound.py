@@ -36,9 +36,9 @@ class Losing:
 
 
 def on_all_receivers(course: Course, line: Line) -> Score:
-    """Send the writes of a course to each kind of receiver; return the sum of the scores.
+    """Send what the driver writes in ``course`` to each kind of receiver; return the total score.
 
-    The line damages the writes in the same way for each receiver.
+    The line damages these bytes in the same way for each receiver.
     """
     total = Score()
     for receiver in RECEIVERS:

@@ -26,8 +26,8 @@ def test_a_planted_motor_is_found(
 ) -> None:
     """Wheel B has another motor. ``calibrate step`` finds the motor's constants within 5 %.
 
-    On a busy computer, commands arrive late, and the tool warns that the steps differ. Then the
-    test begins the calibration again, as the warning advises.
+    On a busy computer, commands arrive late, and the tool may warn that the steps differ. In this
+    case, the test begins the calibration again, as the warning advises.
     """
     monkeypatch.setattr(step, "RUN_UP_S", 1.0)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:

@@ -151,10 +151,10 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
+    """``confs``: two distances in m, ``first_m`` and ``second_m``, in the order of the line.
 
-    By the boards' help text, this distance is the first of the two numbers. On some boards, the
-    track is the first.
+    One is the distance from the axle to the steered wheel, the other is the track. The boards' help
+    text says that the track is second, but some boards report it first.
 
     ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
     """

@@ -199,7 +199,8 @@ class Translation:
 
         The result is True if a reset was sent and a count is nearer to zero than before.
 
-        ``read_s``: time in s at which the report was read, even if it was read late.
+        ``read_s``: time of the read in s. Unlike the report's time, it is not corrected for a late
+        read.
         """
         before, until_s = self._ticks, self._reset_until_s
         if until_s is None:

@@ -80,7 +80,8 @@ class Step:
     ``unsure_mps``: for each wheel, the standard deviation of its last measured speed. The key is
     the index of the wheel's first state.
 
-    ``rows``: changed rows of the transition matrix. The key is the index of the state.
+    ``rows``: the rows of the transition matrix that differ from the identity matrix. The key is the
+    index of the state.
 
     ``noises``: errors to add. Each error has a variance, and a list of the states that it changes.
     Each state comes with its factor.

@@ -141,8 +141,8 @@ class Doubt:
     def heading_told(self) -> None:
         """Remove the constant heading error of this motion: the server now reports the heading.
 
-        Before this report, the turn of this motion was computed from the commands. The random
-        heading error of this turn remains. The position error that it has caused remains, too.
+        Until now, the turn of this motion was computed from the commands. Its random heading error
+        stays in the covariance. So does the position error from the removed constant error.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -167,7 +167,7 @@ class Doubt:
     def end_turn(self, spun_rad: float, told_rad: float | None) -> None:
         """Add the errors of a turn on the spot that has ended.
 
-        ``spun_rad``: the turn that the wheel measured. ``told_rad``: the turn that the server
+        ``spun_rad``: the turn that the right wheel measured. ``told_rad``: the turn that the server
         reported, or None.
         """
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
@@ -181,9 +181,11 @@ class Doubt:
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
-        """Return the errors of a turn on the spot so far, including a small sideways motion.
+        """Return the heading and position errors that a turn on the spot has caused so far.
 
-        ``spun_rad``: the turn that the wheel measured. ``told_rad``: the turn that the server
+        The robot does not turn exactly about its centre, so the position has an error too.
+
+        ``spun_rad``: the turn that the right wheel measured. ``told_rad``: the turn that the server
         reported, or None.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)

@@ -79,14 +79,13 @@ class Jobs:
 
     ``done``: results that the caller has not taken yet.
 
-    ``logging``: whether the server has started its log in this connection: it has acknowledged LOG.
+    ``logging``: whether the server has acknowledged LOG in this connection, and so begun its log.
 
     ``ended``: whether EXIT was sent, which ends the server.
 
     ``moving``: whether the move of a docking job was sent.
 
-    ``turn_record``: name and pieces of the file of the last turn; None if the download was
-    cancelled.
+    ``turn_record``: name and pieces of the file of the last turn; None if it was not downloaded.
     """
 
     def __init__(self) -> None:

@@ -23,7 +23,7 @@ ACCELERATION_MPS2: Final = 1.0
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
 """Standard deviations of the errors of measured speeds, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
-"""Standard deviations of the speed and turn rate of a robot that has started, in m/s and rad/s.
+"""Standard deviations of speed and turn rate after the start of a motion, in m/s and rad/s.
 They apply until speed and turn rate are measured."""
 BLIND_RADPS: Final = 1.5
 """Standard deviation of the turn rate of a robot during a controlled move, in rad/s."""
@@ -36,8 +36,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of a controlled move that is in progress or may run again, or
-        None.
+        ``blind_since_s``: start time of a controlled move that is in progress, or that the server
+        may run twice. None if there is no such move.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

@@ -104,9 +104,8 @@ class SpeedLoop(Motors):
 
     ``trip_s``: average duration of an exchange, in s.
 
-    ``part``: relative size of the last change of the motors' units: the sum of both motors'
-    relative changes. A motor's relative change is the change without sign, divided by the motor's
-    previous units.
+    ``part``: how much the last change changed the motors' units: the sum of one ratio per motor.
+    The ratio is the amount of the change, divided by the motor's units before it.
     """
 
     def __init__(self, settings: MartSettings) -> None:

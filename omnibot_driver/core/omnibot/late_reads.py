@@ -27,8 +27,7 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.schedule import TICK_S
 
 IDLE_S: Final = 0.1
-"""Pause in s that no adapter causes: ten of the board's ticks. An adapter causes pauses of at most
-16 ms."""
+"""Pause in s that is longer than any that an adapter causes (16 ms): ten of the board's ticks."""
 HALF_TICK_S: Final = TICK_S / 2
 """Delay in s below which a frame is regarded as sent in its own tick (10 ms)."""
 GAP_S: Final = 4e-3

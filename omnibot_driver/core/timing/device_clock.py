@@ -216,8 +216,8 @@ class DeviceClock:
         Return the correction in ticks. It is positive if the count was too low because of lost
         ticks.
 
-        ``counted``: whether this read contains a displacement. If so, the tick number of the last
-        displacement is corrected too.
+        ``counted``: whether this read contains a displacement. If so, or if all recent arrivals
+        were late, the tick number of the last displacement is corrected too.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:

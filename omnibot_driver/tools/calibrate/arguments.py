@@ -19,8 +19,8 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter. Only a board that records encoder ticks and accepts gains has this
-parameter."""
+"""Name of a parameter by which ``calibrate`` recognises a board that records encoder ticks and
+accepts gains. Only such a board has it."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),

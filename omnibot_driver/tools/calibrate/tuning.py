@@ -2,7 +2,7 @@
 
 """Find gains of the manual's control law that suit a motor, and predict their effect.
 
-The best gains have the smallest absolute errors after steps of command and load.
+The best gains have the smallest absolute errors after a step of the command or of the load.
 """
 
 from collections.abc import Sequence

@@ -142,8 +142,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Textual then starts a new thread that reads keys. Its old thread survives SIGSTOP and would
-        also read keys, so ``suspend`` ends the old thread first.
+        To draw again, Textual starts a new thread that reads keys. The old thread survives SIGSTOP
+        and would read keys, too. So ``suspend`` ends the old thread before that.
         """
         with self.suspend():
             pass

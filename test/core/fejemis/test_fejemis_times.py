@@ -149,7 +149,8 @@ def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
 def test_rare_reads_lose_no_odometry(seed: int) -> None:
     """The driver reads each port only every 50 ms, so each read brings two or three poses.
 
-    No odometry and no IMU sample is lost. ``seed`` varies the time for which the first line waits.
+    No odometry and no IMU sample is lost. ``seed`` varies how long the robot runs before the driver
+    connects, and when the driver first reads each port.
     """
     bench, chance = Bench(), random.Random(seed)
     for _ in range(chance.randrange(2000)):

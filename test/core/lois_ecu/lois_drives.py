@@ -164,7 +164,7 @@ def nominal(firmware: Firmware, seed: int = 0) -> LoisSettings:
 
 
 def wrong(firmware: Firmware, seed: int) -> LoisSettings:
-    """Return settings of a simulated board: slip, load, and wheel sizes wrong by about 1 %."""
+    """Return settings of a simulated board with slip, load, and wheel sizes about 1 % off."""
     random = Random(f"wrong {seed}")
     return LoisSettings(
         quirks=QUIRKS[firmware],

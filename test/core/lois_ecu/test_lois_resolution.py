@@ -103,8 +103,8 @@ def test_wheels_that_roll_back_are_no_restart(
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
     """The robot drives forward at 50 RPM for 6 s, then backward for longer. No restart is assumed.
 
-    The distance is right within two ticks or 0.03 m. Then the board restarts, so its counts begin
-    at zero. The driver notices this restart.
+    The error of the distance is at most two ticks or 0.03 m, whichever is larger. Then the board
+    restarts, so its counts begin at zero. The driver notices this restart.
     """
     ours = LoisEcuSettings(ticks_per_revolution=per_turn)
     translation, odometry = Translation(ours), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

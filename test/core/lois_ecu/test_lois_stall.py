@@ -79,7 +79,8 @@ def looks_stalled(
     """Return whether a wheel looks stalled.
 
     ``rpm``: reported speeds of left and right wheel, one pair every ``every_s``. ``targets``:
-    set-points in RPM. ``resting``: whether the odometry assumes the left and right wheel at rest.
+    set-points of left and right wheel, in RPM. ``resting``: for each wheel, whether the odometry
+    assumes that it is at rest.
     """
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
@@ -158,10 +159,10 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """The reported speed of a wheel is just above its set-point. The odometry assumes it at rest.
+    """The odometry assumes that a wheel rests. Its reported speed is just above its set-point.
 
-    If it is at rest, it does not start: the controller uses the reported speed and gives no power.
-    So the wheel looks stalled.
+    The controller uses the reported speed, and gives the motor no power. Without power, a wheel at
+    rest does not start. So the driver regards the wheel as stalled.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))

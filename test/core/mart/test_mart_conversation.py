@@ -117,10 +117,9 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """RST IMU checks the IMU. A late ok to an earlier command could be taken for its reply.
+    """RST IMU checks the IMU. A late ok to an earlier command could be taken for this check's.
 
-    So the driver delays RST IMU. The delay is long enough that a late ok arrives before RST IMU can
-    be answered.
+    So the driver sends RST IMU later: any late ok then arrives before RST IMU can be answered.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)

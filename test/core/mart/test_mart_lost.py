@@ -118,7 +118,7 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_hangs() -> None:
     """The port is lost and opens again. The server is the same, so its stop port still hangs.
 
-    After a restart of the server, the driver accepts motions again.
+    The driver still refuses motions. After a restart of the server, it accepts them.
     """
     bench = outlived("source", (0.3, 0.1))
     bench.session.closed(bench.now)

@@ -253,7 +253,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 @pytest.mark.parametrize("period_s", [0.01, 0.2])
 def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> None:
-    """A damaged text arrives a second before the first frames, and does not start the clock.
+    """A damaged text line arrives a second before the first frames, and does not start the clock.
 
     The stamps of the first frames are right, also if the host reads only five times a second.
     """

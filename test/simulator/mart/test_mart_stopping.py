@@ -29,7 +29,7 @@ def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
 
 @pytest.mark.parametrize("speed", [45, 50, 60])
 def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
-    """During the forward drive RM, the stop SM fails. Only the stop SRM ends RM."""
+    """The command SM does not end the forward drive RM: the server answers fail. SRM ends it."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.ask("SM") == "fail no motion"
