@@ -57,9 +57,9 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        The motion monitor has stopped the robot twice within 60 s, and the board has no ~/start:
-        then the release ends the refusal of motion. It does not end the refusal after a first stop.
-        If the board has ~/start, only ~/start ends the refusal after the second stop.
+        If the board has no ~/start, the release ends the refusal of motion after the monitor's
+        second stop within 60 s. It does not end the refusal after a first stop. If the board has
+        ~/start, only ~/start ends the refusal after the second stop.
         """
         if self.until is Until.ESTOP:
             self.start()

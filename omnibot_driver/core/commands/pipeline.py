@@ -147,7 +147,8 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity.
 
-        Raises CommandRefused if the velocity is not allowed, or if the sender's stamp is too old.
+        Raises CommandRefused if the velocity is not allowed, or if the sender's stamp is too old or
+        too far in the future.
 
         ``age_s``: age of the sender's stamp in s. The command expires earlier by this age.
         """

@@ -18,8 +18,8 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Lower limit of the speed in the front board's line, in m/s, for a curve. If the commanded speed
-is lower, the line has the speed 0. Most numbers below the limit cannot be sent safely."""
+"""Lower limit of the commanded speed, in m/s, for a curve in the front board's line. If the
+commanded speed is lower, the line has the speed 0: only few smaller numbers can be sent safely."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""

@@ -43,7 +43,7 @@ class Polls:
         self.begin()
 
     def begin(self) -> None:
-        """Forget all answers, and begin with the first request: this may be another board."""
+        """Forget all answers, and begin with the first request: the board is new or restarted."""
         self.told.clear()
         self._turn = 0
         self._next_at = self._sonar_at = -math.inf

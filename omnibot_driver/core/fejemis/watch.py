@@ -65,7 +65,7 @@ class Watch:
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:
-        """Check all timeouts, and add a notice about each that has expired.
+        """Check all timeouts, and add a notice about each that has newly expired.
 
         Driving requires one data stream from each board. Return whether this call finds that such a
         stream has stopped.

@@ -44,8 +44,8 @@ RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
 In this time, stopped wheels come to rest, and four tick reports arrive. After the last repetition,
-the driver waits for less than ``UNPROVED_S``, and then gives the reset up. So after the last
-repetition, counts near zero are not accepted without a proof of the reset.
+the driver gives the reset up in less than ``UNPROVED_S``. So it never accepts small counts that do
+not change, if a reset would have set them to zero: each repetition restarts that time.
 """
 STEADY_S: Final = 0.3
 """Time in s without a change of the tick counts, after which the wheels are regarded as at rest.

@@ -56,7 +56,7 @@ The driver could then mistake the late reply for the reply to the urgent query.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
-"""Kinds of commands whose late replies can be mistaken for the reply to a query.
+"""Kinds of commands of which a copy of the reply can be mistaken for the reply to another query.
 
 Most of these replies are only a number.
 """

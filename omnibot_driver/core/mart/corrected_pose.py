@@ -113,9 +113,9 @@ class CorrectedPose:
     def _end_turn(self, *, may_be_recorded: bool) -> float:
         """End a turn on the spot, and return the correction of its angle in rad.
 
-        If the angle from the server is implausible, the angle from the encoder count replaces it.
-        Otherwise the correction is zero. There are two possible reasons: the server's angle belongs
-        to another motion, or only one of the wheels has turned. So the whole difference between the
+        If the angle from the server is plausible, the correction is zero. Otherwise the angle from
+        the encoder count replaces it. There are two possible reasons: the server's angle belongs to
+        another motion, or only one of the wheels has turned. So the whole difference between the
         two angles is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)

@@ -19,7 +19,7 @@ LEAST_S: Final = 0.05
 class MeanSpeeds:
     """The mean speeds of one motion.
 
-    ``spread_s``: uncertainty, in s, of the time to which the last reply refers.
+    ``spread_s``: uncertainty, in s, of the time at which the server measured the last count.
     """
 
     def __init__(self) -> None:

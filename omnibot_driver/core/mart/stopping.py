@@ -46,8 +46,8 @@ SLOW_STOP: Final = (
 NO_START_S: Final = 0.75
 """Duration in s of a controlled turn (MCR, MCL) beyond which a wheel has certainly turned.
 
-If no wheel turns, the server gives up after 0.6 s. If the wheels turn too long after the end of the
-turn, the server gives up later, because it waits 0.75 s for the robot to stop.
+If no wheel turns, the server gives up after 0.6 s. If a wheel turns, the server replies later than
+0.75 s after the start, because it then waits 0.75 s for the robot to stop.
 """
 
 

@@ -231,10 +231,10 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the odometry must adopt the board's frame in which this pose is given.
 
-        This happens with the first pose, and with a pose in a new frame after a suspected restart.
+        This happens at the beginning, and with a pose in a new frame after a suspected restart.
         A pose is *confirmed* (``confirmed``) if it agrees with the last doubted pose.
 
-        * Before a first pose was accepted: the result is True if the pose is confirmed.
+        * While no frame was adopted or assumed: the result is True if the pose is confirmed.
         * Without a suspected restart: the result is False.
         * After a suspected restart, the pose fits the motion since the restart, and fits it better
           than the old frame: the frame is new, and the result is True.

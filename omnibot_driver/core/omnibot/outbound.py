@@ -34,9 +34,9 @@ is sent, because one may be lost. The zeros also wake a board; three are enough 
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-The previous frame may have lost its end. Then the zeros take the place of the lost bytes, and the
-board obeys a wrong command. Only a few zeros are sent, so that the motion frame soon replaces the
-wrong command.
+The previous frame may have lost its end. If the zeros take the place of the lost bytes, the board
+obeys a wrong command. Only a few zeros are sent, so that the motion frame soon replaces the wrong
+command.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

@@ -80,8 +80,8 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 class Segment:
     """A complete frame of the best interpretation.
 
-    * ``start``, ``end``: its position among the bytes. * ``sure``: whether every interpretation
-      that reads its first byte in another way costs clearly more.
+    * ``start``, ``end``: its position among the bytes.
+    * ``sure``: whether every other interpretation of its first byte costs clearly more.
     """
 
     start: int

@@ -280,7 +280,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set a tick's stamp by the fitted clock, but limit the step from the last stamp.
 
-        The smallest step is half a period, or ``room_s`` if that is shorter.
+        The smallest step is half a period, or ``room_s`` if that is shorter, but it is never below
+        ``SMALLEST_STEP_S``.
 
         ``latest_s``: latest allowed stamp, in s.
 
