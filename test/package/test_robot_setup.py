@@ -109,8 +109,8 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
     """systemd ends the driver by SIGINT, as ctrl-C does.
 
-    When the driver crashes, systemd sends only SIGINT to the guard process, which ignores it. So
-    the guard can still stop the robot.
+    When the driver crashes, systemd sends SIGINT to the guard process, which ignores it. systemd
+    does not kill the guard at once, so the guard can still stop the robot.
     """
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]

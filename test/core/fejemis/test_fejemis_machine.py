@@ -48,7 +48,8 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
     """If a thousand lift voltages or colours are commanded within 1 s, only about twenty are sent.
 
-    The newest of them is among these. A voltage of 0 is sent at once.
+    Each time, the newest one is sent, and the older ones are discarded. A voltage of 0 is sent at
+    once.
     """
     machine = Machine()
     machine.set_brush(True)

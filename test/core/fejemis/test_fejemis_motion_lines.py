@@ -228,8 +228,8 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
     """A motion line without a checksum loses one character.
 
     The outer wheel becomes faster only if this character is the decimal point or a digit of the
-    speed. It changes its direction only if this character is the minus sign. The test tries each
-    speed up to 1.1 m/s, in steps of 1 mm/s.
+    speed. It changes its direction only if this character is the minus sign. The test tries speeds
+    below 1.1 m/s in steps of 1 mm/s, and from 3 to 20 m/s in steps of 1 m/s.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):

@@ -116,7 +116,7 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
     ],
 )
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
-    """The odometry ignores a pose that is wrong by more than the robot can have moved.
+    """The odometry ignores a false pose: one that does not fit the motion of the wheels.
 
     With the next correct pose, the odometry continues.
     """

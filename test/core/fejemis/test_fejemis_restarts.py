@@ -142,9 +142,9 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
     """The drive board restarts while its port is away. Meanwhile, the computer stalls.
 
-    The front board's port stays open. The driver notices the restart, so the odometry does not
-    jump. After a restart, the board's lines seem to be late. A stall can also make lines late. But
-    this stall ends before the port is back, so it cannot delay a line of the new connection.
+    Only this port is away. The driver notices the restart, so the odometry does not jump. After a
+    restart, the board's lines seem to be late. A stall can also make lines late. But this stall
+    ends before the port is back, so it cannot delay a line of the new connection.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)

@@ -128,7 +128,7 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
     """Reads are up to 0.1 s late at random, so a further read that is 0.1 s late is not irregular.
 
-    A read that seems early is always irregular, because no read can be early.
+    A read that seems early is irregular, because no read can be early.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

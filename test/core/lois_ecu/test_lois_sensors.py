@@ -113,9 +113,9 @@ def test_false_headings_at_north_are_refused() -> None:
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
     """The odometry is reset at a compass heading of 120°. Later headings of 120° are accepted.
 
-    A robot that faces north may falsely report 120°, so the driver rejects this heading from it.
-    This robot does not face north. The reset sets its yaw to zero, but the driver still knows in
-    which direction it faces.
+    While the robot faces north, the board may falsely report 120°, so the driver then rejects 120°.
+    This robot does not face north. The reset sets its yaw to zero, but the driver still knows which
+    heading to expect.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

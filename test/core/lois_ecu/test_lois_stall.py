@@ -239,7 +239,7 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
     """After a forward drive, the user commands the robot backward, but the wheels are blocked.
 
-    The odometry does not subtract the forward drive again: its pose moves by less than 0.15 m.
+    The odometry does not subtract the forward drive: its pose moves by less than 0.15 m.
 
     ``reset``: whether the odometry is reset before the backward command.
     """

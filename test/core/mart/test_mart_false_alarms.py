@@ -167,8 +167,7 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     """After a stop, the wheels of a heavy robot turn for another 1.3 s.
 
     The server waits only 0.6 s for the end of the motion, and then reports a failure. The driver
-    does not report that the robot moves without a command. The test stops the robot by command and
-    by e-stop in turn.
+    does not report that the robot moves without a command. Every second stop is an e-stop.
     """
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):

@@ -137,7 +137,7 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
     """The server's process is stopped while the robot is at rest, and continues after 5 s.
 
     Meanwhile the driver has used the stop port. The server then answers the queries that have
-    waited. The driver does not regard the values in these replies as the end of a motion, so it
+    waited. The driver does not regard the values in these replies as results of a motion, so it
     drives the robot again.
     """
     bench = MartBench("source").ready()

@@ -49,7 +49,7 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during a forward drive. Its first datagram to arrive is SL (stop port).
+    """A driver starts during a forward drive. Its first command to arrive is SL (stop port).
 
     The network was interrupted until then. After SL, the driver does not send SRM, the usual stop
     of a forward drive: SRM would hang the server.

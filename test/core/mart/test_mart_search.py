@@ -42,10 +42,10 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """The search finds no failure: the server never hangs, and the robot can always be stopped.
+    """The search finds no failure: the server does not hang, and the robot can be stopped.
 
     It tries all cases in which up to two copies and one reply are late. The IMU may die at any
-    step.
+    step. With a dead IMU, or when the driver has given up, only a crash counts as a failure.
     """
     found = search()
     assert found.bad == ()
