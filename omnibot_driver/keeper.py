@@ -99,8 +99,7 @@ class Keeper:
         * ``stopped``: whether the robot is already stopped. If not, the guard first sends its stop
           command.
         * ``written``: whether the driver could write its last packets to the port. If not, old
-          motion
-         commands may still wait in the kernel's output, so the guard discards this output.
+          motion commands may still wait in the kernel's output, so the guard discards this output.
         """
         self._restart_at = math.inf
         if stopped:

@@ -268,7 +268,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
-    """A refusal says how old the command is, and if the network or this computer is the cause."""
+    """A refusal says how old the command is, and whether to check the network or this computer."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
         Delay(1.2, 0.1).require("cmd_vel", 0.5)
     with pytest.raises(CommandRefused, match=r"waited 1\.1 s in this driver's queue.* load"):

@@ -15,14 +15,14 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Commanded speeds in m/s. The robot comes to rest during the two zeros at the end. After them,
-the list begins again."""
+"""Commanded speeds in m/s, again and again. During the two zeros at the end, the robot comes to
+rest, so that it can be started again."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Publish each speed to all robots, and record when each robot gets the speed first."""
+    """Publish each speed to all robots; record when it was first published to each of them."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

@@ -74,7 +74,7 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Add the result of another row. Rows with the same name are combined into one row."""
+        """Add another outcome. Rows with the same name are combined into one row."""
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:

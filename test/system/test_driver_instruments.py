@@ -133,7 +133,7 @@ def test_the_bias_is_what_was_set_last(
     imu = probe.listen(Imu, "imu/data_raw")
 
     def rate() -> float:
-        """Return the IMU's mean yaw rate of 20 messages, divided by the simulated gyro's bias."""
+        """Return the mean yaw rate in the last 20 IMU messages, divided by the simulated bias."""
         mean = sum(message.angular_velocity.z for message in imu[-20:]) / 20
         return mean / math.radians(PLANTED_DPS[2])
 

@@ -171,7 +171,7 @@ def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = lambda *_, **__: open('/')"
-"""Code that keeps the driver from opening a port, because a real robot may be connected."""
+"""Code that keeps the driver from opening a port. A real robot may be on the default port."""
 
 
 @pytest.mark.parametrize(

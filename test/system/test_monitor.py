@@ -54,8 +54,7 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received a motion command.
 
-    One press may have no effect: the driver may stall, or the subscription may not be discovered
-    yet.
+    One press may have no effect: a program may stall, or a subscription may not be discovered yet.
     """
     for _ in range(20):
         said.clear()

@@ -59,7 +59,7 @@ def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: flo
 def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
     """After the first press of a key, the motion ends after 0.6 s.
 
-    If the user presses or holds the same key, the motion ends 0.3 s after the last repetition.
+    If the key is repeated before that, the motion ends 0.3 s after the last repetition.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)

@@ -22,7 +22,8 @@ WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 class DriveConfig:
     """Configuration of the drive Teensy.
 
-    ``wheel_base_m``: distance between the driving wheels. Only the odometry uses this value.
+    ``wheel_base_m``: distance between the driving wheels, for the odometry. The control of turns
+    uses B in ``confs_m`` instead.
 
     ``confs_m``: the manual's B and F, by which the Teensy controls turns. B is the distance between
     the driving wheels, F the distance from the axle to the steered wheel.

@@ -205,7 +205,7 @@ class Feed:
     def _lacks(self) -> frozenset[str]:
         """Return those of ``imu``, ``start`` and ``pause`` that this driver's board does not have.
 
-        The result is empty until the monitor has found out what the board has.
+        A name is left out as long as the monitor does not know whether the board has this.
         """
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():

@@ -19,7 +19,7 @@ DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 BARS: Final = " ▁▂▃▄▅▆▇"
 ARROWS: Final = "→↗↑↖←↙↓↘"
 SMALLEST_M: Final = 0.5
-"""Smallest length in m that the width or height of a picture shows, so that noise does not fill the
+"""Smallest length in m that the longer side of a picture shows, so that noise does not fill the
 picture."""
 LARGEST_M: Final = 1e6
 

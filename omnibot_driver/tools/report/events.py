@@ -16,11 +16,11 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which a state must appear in /diagnostics, if the driver still runs.
+"""Time in s from the beginning of the last state in the log. A driver that still runs reports this
+state in /diagnostics even later.
 
-The time is counted from the beginning of the state. "disconnected" is the last state of a driver
-that has ended, or of one that has lost its board. A driver that has lost its board still reports
-the state in /diagnostics after this time.
+If the last state is "disconnected", the driver has ended, or it has lost its board and still runs.
+If /diagnostics does not show the state after this time, the driver has ended.
 """
 
 

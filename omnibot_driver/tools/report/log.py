@@ -75,7 +75,8 @@ class Series:
 class Span:
     """A span of time.
 
-    ``what``: the driver's state during this time; empty if the span does not stand for a state.
+    ``what``: the state of the driver or of its e-stop during this time; empty if the span does not
+    stand for a state.
     """
 
     begin_s: float
