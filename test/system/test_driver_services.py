@@ -100,7 +100,7 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     pressed = len(latched)
     for _ in range(60):  # the driver takes at least one message for each call
         assert probe.call(Trigger, "reset_odometry").success
-    assert all(message.data for message in latched[pressed - 1 :])
+    assert all(message.data for message in latched[pressed - 1 :]), latched
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
