@@ -96,11 +96,11 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     for _ in range(50):
         button.publish(Bool(data=False))
     driver.process.send_signal(signal.SIGCONT)
-    probe.wait_for(lambda: latched and latched[-1].data)
-    pressed = len(latched)
+    driver.wait_for_line("e-stop latched by the topic estop")
     for _ in range(60):  # the driver takes at least one message for each call
         assert probe.call(Trigger, "reset_odometry").success
-    assert all(message.data for message in latched[pressed - 1 :]), latched
+    probe.wait_for(lambda: latched and latched[-1].data)
+    assert "e-stop released" in probe.call(SetBool, "estop", data=False).message
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
