@@ -274,7 +274,9 @@ class FejemisTopics:
 def _why_not_request(what: str, session: Session) -> str:
     """Return why a topic, device or job (``what``) is refused now; empty if it is allowed."""
     why: str = session.interlocks.why_not_request()
-    if not why and session.state in ("disconnected", "connecting"):
+    if not why and session.state == "disconnected":
+        why = NOT_CONNECTED
+    elif not why and session.state == "connecting":
         why = session.board.refusal or NOT_CONNECTED
     return f"{what} refused: {why}" if why else ""
 
