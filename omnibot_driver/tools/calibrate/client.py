@@ -24,6 +24,11 @@ from omnibot_driver.tools.needs import ToolError
 
 FOUND_WITHIN_S: Final = 5.0
 ANSWER_WITHIN_S: Final = 12.0
+REQUESTS: Final = 3
+"""Number of times that the tool sends a request that may be repeated.
+
+The middleware drops the answer if the driver has not discovered the new client within 0.1 s.
+"""
 SPIN_S: Final = 0.005
 """Time, in s, for which one call of the executor waits for a message.
 
@@ -103,7 +108,7 @@ class Client:
 
     def _get_parameters(self, names: Sequence[str]) -> dict[str, Value]:
         request = GetParameters.Request(names=names)
-        answer = self._call(GetParameters, f"{self.driver}/get_parameters", request)
+        answer = self._call(GetParameters, f"{self.driver}/get_parameters", request, REQUESTS)
         values = [parameter_value_to_python(value) for value in answer.values]
         if len(values) != len(names):
             raise ToolError(
@@ -120,7 +125,7 @@ class Client:
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
         ]
         request = SetParameters.Request(parameters=messages)
-        answer = self._call(SetParameters, f"{self.driver}/set_parameters", request)
+        answer = self._call(SetParameters, f"{self.driver}/set_parameters", request, REQUESTS)
         for name, result in zip(values, answer.results, strict=True):
             if not result.successful:
                 raise ToolError(f"the driver refuses {name}: {result.reason}")
@@ -153,15 +158,20 @@ class Client:
             raise ToolError(f"~/{service}: {answer.message}")
         return str(answer.message)
 
-    def _call(self, kind: Any, name: str, request: Any) -> Any:
+    def _call(self, kind: Any, name: str, request: Any, times: int = 1) -> Any:
+        """Call a service, and return its answer. Raises ToolError if none comes.
+
+        ``times``: number of times that the request is sent if no answer comes.
+        """
         client = self._node.create_client(kind, name)
         try:
             if not self._wait(client.service_is_ready, FOUND_WITHIN_S):
                 raise ToolError(f"{name} is not available; check that the driver still runs")
-            future = client.call_async(request)
-            if not self._wait(future.done, ANSWER_WITHIN_S):
-                raise ToolError(f"{name} does not answer; check that the driver still runs")
-            return future.result()
+            for _ in range(times):
+                future = client.call_async(request)
+                if self._wait(future.done, ANSWER_WITHIN_S / times):
+                    return future.result()
+            raise ToolError(f"{name} does not answer; check that the driver still runs")
         finally:
             self._node.destroy_client(client)
 

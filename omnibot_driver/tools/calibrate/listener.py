@@ -170,9 +170,13 @@ class Listener(Client):
         """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
-            for _ in range(AT_ONCE):
-                self._executor.spin_once(timeout_sec=0.0)
+            self._hear_pending()
         return silent(self._heard_s, wanted, time.monotonic())
+
+    def _hear_pending(self) -> None:
+        """Read the messages that have already arrived. Some may wait if this program was late."""
+        for _ in range(AT_ONCE):
+            self._executor.spin_once(timeout_sec=0.0)
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:

@@ -231,6 +231,8 @@ class Robot(Listener):
         ):
             self._send(topic, HALT)
             self._hear(PERIOD_S)
+            if time.monotonic() - self._heard_s[ODOMETRY] > STOOD_S:
+                self._hear_pending()
             now_s = time.monotonic()
             stands = all(abs(speed) <= STANDING for speed in self._twist)  # NaN is not rest
             standing_since_s = min(standing_since_s, now_s) if stands else math.inf
