@@ -94,6 +94,15 @@ def terminal() -> Iterator[Terminal]:
 
 
 @pytest.fixture
+def no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the driver wait longer for its guard.
+
+    A busy computer may delay the guard's start and its repetition of the stop bytes.
+    """
+    monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", 60.0)
+
+
+@pytest.fixture
 def line() -> Iterator["Line"]:
     """Yield a guarded line. At the end, check that no process and no descriptor is left behind."""
     from guarded_line import Line

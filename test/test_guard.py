@@ -33,24 +33,20 @@ from omnibot_driver import guard
 from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import Keeper
 
-
-@pytest.fixture(autouse=True)
-def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the driver wait longer for its guard.
-
-    A busy computer may delay the guard's start and its repetition of the stop bytes.
-    """
-    monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", PATIENCE_S)
+pytestmark = pytest.mark.usefixtures("no_guard_is_killed_while_it_speaks")
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
     """The driver has stopped the robot itself and ends. The guard process writes nothing."""
+    begun_s = time.monotonic()
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     alive(keeper, 0.2)
     keeper.end(stopped=True)
+    took_s = time.monotonic() - begun_s
     keeper.end(stopped=True)
     os.write(line.near, b"end")
-    assert line.hear(b"end") == b"end"
+    # If this computer stalls, the guard rightly speaks before the end.
+    assert line.hear(b"end") == b"end" or took_s > 0.9 * guard.LIMIT_S
 
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
@@ -70,13 +66,18 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
+    beaten_s = time.monotonic()
     os.write(line.near, b"so far: ")
     assert line.hear(b"so far: ") == b"so far: " or longest_s > 0.9 * guard.LIMIT_S
     line.hear(b"so far: " + 2 * LAST_WORDS)
-    alive(keeper, 2 * guard.LIMIT_S)
+    keeper.beat(time.monotonic())
+    silence_s = time.monotonic() - beaten_s
+    longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"and again: ")
     heard = line.hear(b"and again: " + LAST_WORDS)
-    assert heard.partition(b"and again: ")[0].count(LAST_WORDS) < guard.TIMES
+    count = heard.partition(b"and again: ")[0].count(LAST_WORDS)
+    late = silence_s > guard.LIMIT_S + 0.8 * guard.TIMES * guard.PACE_S
+    assert count < guard.TIMES or late or longest_s > 0.9 * guard.LIMIT_S
     keeper.end(stopped=True)
 
 

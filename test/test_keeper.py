@@ -26,6 +26,8 @@ from guarded_line import (
 from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, Keeper
 
+pytestmark = pytest.mark.usefixtures("no_guard_is_killed_while_it_speaks")
+
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
     """A suspended guard process does not read the new stop bytes. The driver replaces this guard.
@@ -63,6 +65,7 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
+    os.waitid(os.P_PID, first, os.WEXITED | os.WNOWAIT)
     told = beat_until(keeper, lambda: replaced(line, first))
     assert "exit code -9" in told
     assert told.count("starting another guard process") == 1

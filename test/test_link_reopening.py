@@ -8,7 +8,16 @@ import time
 from pathlib import Path
 
 import pytest
-from listener import PATIENCE_S, STOP, Listener, kinds, link_to, session, wait_for_the_end_of
+from listener import (
+    PATIENCE_S,
+    STOP,
+    Listener,
+    end_patiently,
+    kinds,
+    link_to,
+    session,
+    wait_for_the_end_of,
+)
 
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
@@ -124,11 +133,14 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
         wait_for_the_end_of("omnibot-reader")
 
 
-def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
+def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The port is lost during a drive, and appears again while the driver ends.
 
     The driver sends Stop. It does not report that the robot stands, because no data confirms this.
     """
+    end_patiently(monkeypatch)
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
     link = link_to(str(name), listener, ours)

@@ -47,7 +47,8 @@ def test_a_command_that_waited_while_the_pacer_stood_still_is_refused(
     listener.wait_for(lambda: ours.state == "nominal")
     drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
     for _ in range(20):  # if the machine hangs, that is another stall: try again
-        if obeyed(lambda: drive([time.time_ns()])) and board.wait_for(lambda b: b.driven, 0.3):
+        listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
+        if board.wait_for(lambda b: b.driven, 0.3):
             break
     else:
         raise AssertionError("it does not drive")
@@ -92,18 +93,20 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
     listener.wait_for(lambda: ours.state == "nominal")
     drive = partial(link.command, Session.command_twist, BodyTwist(0.3, 0.0, 0.0))
     for _ in range(20):  # if the machine hangs, that is another stall: try again
-        fresh = obeyed(lambda: drive([time.time_ns()]))
-        if fresh and board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], 0.3):
+        listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
+        if board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], 0.3):
             break
     else:
         raise AssertionError("it does not drive")
+    sent_ns = time.time_ns()
     suspended_s = 3600.0
     assert board.wait_for(lambda b: kinds(b)[-1:] == ["wheels"], PATIENCE_S)
     listener.wait_for(lambda: any("for 36" in str(event) for event in listener.events))
     with pytest.raises(CommandRefused, match="waited"):
-        drive([time.time_ns() - 1_000_000_000])  # sent during the suspension
+        drive([sent_ns])
+    before = len(board.board.commands)
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
-    assert board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], PATIENCE_S)
+    assert board.wait_for(lambda b: "velocity" in kinds(b)[before:], PATIENCE_S)
     link.close("stop")
 
 
@@ -135,8 +138,8 @@ def test_a_stall_is_noticed_before_the_bytes_that_waited_are_decoded(
 
     def hang(_session: Session, _now: float) -> None:
         heard.append(len(order))
-        end = board.board.tick + 60
-        assert board.wait_for(lambda b: b.tick >= end, PATIENCE_S)
+        end_s = time.monotonic() + 0.6
+        assert board.wait_for(lambda _: time.monotonic() >= end_s, PATIENCE_S)
 
     drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))  # no stall is left

@@ -125,8 +125,9 @@ def by_topic(rig: Rig) -> None:
 
 def by_signal_while_a_call_is_pending(rig: Rig) -> None:
     """Send SIGTERM while a call of ``~/reset`` is pending."""
+    mark = len(rig.driver.lines)
     rig.probe.call_async(Trigger, "reset")
-    rig.probe.wait_for_state("connecting")
+    rig.driver.wait_for_line("state: connecting", mark)
     rig.driver.process.send_signal(signal.SIGTERM)
 
 

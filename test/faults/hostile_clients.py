@@ -66,6 +66,7 @@ def flood_of_releases(rig: Rig) -> None:
     publisher = rig.probe.publisher(Bool, "estop")
     rig.drive()
     rig.probe.call(SetBool, "estop", data=True)
+    rig.probe.wait_for(lambda: rig.estops[-1].data)
     since = rig.line.tick
     for _ in range(100):
         for _ in range(10):

@@ -131,6 +131,7 @@ def server_closes_one_direction(rig: NetworkRig) -> None:
     rig.server.close_from_here()
     rig.hand.leave()
     rig.expect_still(since, "closed in one direction", rig.kind.deaf_s)
+    rig.driver.wait_for_line(LOST, mark)
     rig.probe.wait_for_state("nominal")
     rig.expect_said_once(LOST, mark)
 

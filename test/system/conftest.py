@@ -18,6 +18,8 @@ from omnibot_driver.shared_session import WAITED
 if TYPE_CHECKING:
     from omnibot_driver.simulator.omnibot import PtyBoard
 
+UNHEARD = "motion command refused: no data from the board"
+
 
 @pytest.fixture(scope="session", autouse=True)
 def _ros() -> Iterator[None]:
@@ -54,13 +56,14 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
-    If the driver refuses the probe's newest message because of a stall, the probe publishes the
-    message again. If an answer to the probe is lost, the probe calls the service again.
+    If the driver refuses the probe's newest message because of a stall of the driver or of the
+    simulated board, the probe publishes the message again. If an answer to the probe is lost, the
+    probe calls the service again.
     """
 
     def start(driver: Driver) -> Probe:
         probe = stack.enter_context(Probe(driver.namespace))
-        driver.answers[WAITED] = probe.publish_again
+        driver.answers[WAITED] = driver.answers[UNHEARD] = probe.publish_again
         driver.answers[ANSWER_LOST] = probe.call_again
         return probe
 

@@ -175,6 +175,10 @@ class Probe:
 
         threading.Timer(WARN_EVERY_S + 2 * SETTLE_S, publish).start()
 
+    def forget_message(self) -> None:
+        """Do not publish the newest message again: the test has repeated it until it was obeyed."""
+        self._publish_again = lambda: None
+
     def call_again(self) -> None:
         """Repeat the calls that have no answer yet.
 
@@ -197,6 +201,7 @@ class Probe:
             yield
         finally:
             self.remove(timer)
+            self.forget_message()
 
     def wait_for_graph(self, predicate: Callable[[], object]) -> None:
         """Wait until the predicate holds. The probe checks it every 20 ms."""

@@ -156,6 +156,7 @@ def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
         return odometry[-1].pose.pose.position.y > 0.5 and drives(odometry[-1])
 
     probe.wait_for(drive)
+    probe.forget_message()
     message = next(filter(drives, reversed(odometry)))
     assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
     covariance = message.pose.covariance.reshape(6, 6)

@@ -34,7 +34,7 @@ BUSY_S = 3.0
 """Timeout of commands and data in s, so long that a busy test machine seldom exceeds it."""
 ATTEMPTS = 5
 STALLED = "driver stalled for"
-OVERLOADED = ("did not run for", "not overloaded")
+OVERLOADED = ("did not run for", "not overloaded", "no odometry arrives", "does not answer")
 """Texts in the tool's error messages that show that the computer is too busy.
 
 ``STALLED`` is the text in the driver's log that shows the same.

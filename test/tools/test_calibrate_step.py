@@ -33,10 +33,10 @@ def test_a_planted_motor_is_found(
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
         for _ in range(ATTEMPTS):
             code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
-            table = capsys.readouterr().out
+            table, errors = capsys.readouterr()
             if UNSTEADY not in table:
                 break
-    assert code == 0, table
+    assert code == 0, table + errors
     for name, planted, tolerance in (
         ("B: gain", 1.0, 0.05),
         ("B: PWM per count", 35.0, 1.75),

@@ -114,8 +114,10 @@ def test_brush_lift_and_light_obey_and_the_estop_ends_brush_and_lift(
     robot.wait_until(lambda board: board.front.leds[5] == (255, 128, 0))
     assert probe.call(SetBool, "brush", data=True).success
     robot.wait_until(lambda board: board.vehicle.brush)
-    lift.publish(Float32(data=6.0))
+    timer = probe.node.create_timer(0.1, lambda: lift.publish(Float32(data=6.0)))
     robot.wait_until(lambda board: board.vehicle.lift.volts == 6.0)
+    probe.remove(timer)
+    probe.forget_message()
     robot.wait_until(lambda board: board.vehicle.lift.volts == 0.0)  # after cmd_vel_timeout
     timer = probe.node.create_timer(0.1, lambda: lift.publish(Float32(data=-8.0)))
     robot.wait_until(lambda board: -8.0 <= board.vehicle.lift.volts < -7.9)
@@ -125,6 +127,7 @@ def test_brush_lift_and_light_obey_and_the_estop_ends_brush_and_lift(
     assert not answer.success
     assert "release" in answer.message
     probe.remove(timer)
+    probe.forget_message()
     assert probe.call(SetBool, "estop", data=False).success
     robot.stands_for_good()
     assert not robot.do(lambda board: board.vehicle.brush or board.vehicle.lift.volts)
