@@ -29,7 +29,7 @@ from omnibot_driver.messages import MessageSettings, Wheels
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 """First four bytes of every message in little-endian CDR. Alignment is counted from the byte after
-them."""
+these four bytes."""
 STAMP: Final = "iI"
 TWIST: Final = struct.Struct("<4s6d").unpack_from
 NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)

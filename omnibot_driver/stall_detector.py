@@ -19,8 +19,8 @@ in which the guard stops the robot.
 SETTLE_S: Final = 0.25
 """Time in s for which the driver still refuses commands after the end of a stall.
 
-The driver knows the sender's clock only roughly. A command may have been sent during the stall,
-although its stamp is a little later than the end of the stall.
+The reason: the driver knows the sender's clock only roughly. So the stamp of a command that was
+sent during the stall may be a little later than the end of the stall.
 """
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
@@ -81,7 +81,9 @@ class StallDetector:
         self._day_ns = wall_ns - round(now * 1e9)
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """Return False if a command may have been sent before or during a recent stall, else True.
+        """Return False if a command may have been sent before or during a recent stall.
+
+        Otherwise, return True.
 
         ``sent_ns``: the command's time of sending, as time of day in ns. ``now``: time of
         ``boot_time_s``.

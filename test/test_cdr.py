@@ -171,9 +171,9 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """A Twist has NaN or infinity in one of its six axes. The driver refuses it.
+    """The driver refuses a Twist with NaN or infinity in one of its six values.
 
-    This also applies to axes along which the robot cannot move.
+    It also refuses it if the robot cannot move in the direction of this value.
     """
     values = [0.1] * 6
     values[place] = nonsense

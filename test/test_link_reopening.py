@@ -26,9 +26,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
-    """A port appears late, and the link opens it.
+    """A port appears late. The link opens it then.
 
-    Another port never appears. Its link can be closed, too.
+    A second link waits for a port that never appears. This link can be closed while it waits.
     """
     listener, ours = Listener(), session()
     name = str(tmp_path / "omnibot")
@@ -138,7 +138,8 @@ def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(
 ) -> None:
     """The port is lost during a drive, and appears again while the driver ends.
 
-    The driver sends Stop. It does not report that the robot stands, because no data confirms this.
+    The driver sends Stop. No data confirms that the robot is at rest, so the driver does not report
+    that it is.
     """
     end_patiently(monkeypatch)
     name = tmp_path / "omnibot"

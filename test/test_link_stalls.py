@@ -23,8 +23,8 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def obeyed(command: Callable[[], None]) -> bool:
     """Return whether the command is accepted.
 
-    After a stall, every command is refused until the pacer has run, so a test may have to repeat
-    it.
+    After a stall, the driver refuses every command until the pacer has run. So a test may have to
+    call this function several times.
     """
     try:
         command()
@@ -36,9 +36,9 @@ def obeyed(command: Callable[[], None]) -> bool:
 def test_a_command_that_waited_while_the_pacer_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A thread holds the session's lock, so the pacer cannot run, and a command waits.
+    """A thread holds the session's lock. So the pacer cannot run, and a command waits for the lock.
 
-    The waiting command is refused. Later commands are obeyed.
+    The driver refuses the command that waited. After this stall, it obeys new commands.
     """
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()

@@ -12,8 +12,8 @@ from typing import Final
 from omnibot_driver.parameters import RANGE_TYPES, Parameter
 
 MOST_GAINS: Final = 17
-"""Largest number of values in ``steering_gains``. The board's answer to ``cpsteer``, the command
-that reads these values, has the same number of values."""
+"""Largest number of values in ``steering_gains``. The command ``cpsteer`` asks the board for these
+values. The board's answer has the same number of values."""
 
 FRONT_PORT: Final = (
     Parameter(

@@ -61,7 +61,7 @@ class LongTask:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Fail the task if the robot was driven at the last call, but has been stopped since.
+        """Fail the task if the robot was driven at the last call of this method, but is not now.
 
         ``driven``: whether a command drives the robot now.
         """

@@ -132,8 +132,9 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 def _signals_as_readable() -> Iterator[int]:
     """Yield a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives.
 
-    These signals have no other effect. If the process already ignores SIGHUP, as under nohup, it
-    still ignores SIGHUP.
+    These signals have no other effect. There is one exception: under nohup, for example, the
+    process ignores SIGHUP from the start. Then SIGHUP remains ignored, and the descriptor does not
+    show it.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -175,9 +176,10 @@ def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
 
 
 def _is_in_background(console: int) -> bool:
-    """Return whether the console is a terminal that now belongs to another program, as after ``&``.
+    """Return whether the console is a terminal that now belongs to another program.
 
-    The kernel would suspend this process if it read from such a terminal.
+    This is so, for example, if the user started the simulator with ``&``. The kernel would suspend
+    this process if it read from such a terminal.
     """
     try:
         return os.tcgetpgrp(console) != os.getpgrp()

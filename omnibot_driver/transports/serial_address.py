@@ -21,10 +21,12 @@ from omnibot_driver.transports import NOT_POLLABLE
 
 
 def check_address(url: str, parameter: str = "port", *, pollable: bool = False) -> None:
-    """Raise ParameterError if this port can never be opened, however often the driver tries.
+    """Raise ParameterError if no attempt to open this port can ever succeed.
 
-    ``pollable``: whether the port must have a file descriptor. This function opens nothing. It
-    accepts a missing device and an unknown host, because they may appear later.
+    ``pollable``: whether the port must have a file descriptor.
+
+    This function opens nothing. It accepts a missing device and an unknown host, because they may
+    appear later.
     """
     try:
         port = serial.serial_for_url(url, do_not_open=True)

@@ -87,7 +87,8 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
     """The board sends no pose. After a second, the odometry assumes heading 0.
 
-    The odometry publishes the 25 waiting deltas together, and each later delta immediately.
+    Then it publishes the 25 deltas that have waited, all together. It publishes each later delta
+    immediately.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(24):
@@ -101,9 +102,10 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The board sends no pose, so heading 0 is assumed. Later, poses with another heading arrive.
+    """The board sends no pose at first, so the odometry assumes heading 0.
 
-    Odom does not jump. Further motion is computed with the heading of the poses.
+    Later, poses with another heading arrive, and agree with each other. Odom does not jump. From
+    then on, motion is computed with the heading of these poses.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):
@@ -221,9 +223,9 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """The odometry is reset, and the board's first pose arrives only later.
+    """The odometry is reset before the board has sent its first pose.
 
-    Odom contains the motion since the reset, and no motion from before it.
+    After the first pose, odom contains only the motion since the reset.
     """
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
@@ -235,10 +237,10 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """The odometry counts how often its frame gets a new place in the board's earth frame.
+    """The odometry counts how often its frame is moved relative to the board's earth frame.
 
-    A reset, for example, changes this place. The odometry counts nothing else, because only these
-    changes make old goals invalid.
+    A reset, for example, moves the odometry frame. Displacements and usual poses are not counted,
+    because they do not make old goals invalid.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
@@ -260,8 +262,8 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
     """The heading is known once two poses of the board agree.
 
-    After a gap of 20 displacements, it is unknown again. If the odometry only assumes heading 0,
-    the heading is unknown too.
+    After a gap of 20 displacements, the heading is unknown again. A heading of 0 that the odometry
+    has only assumed is also regarded as unknown.
     """
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known

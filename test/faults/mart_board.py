@@ -2,8 +2,8 @@
 
 """The MART controller in the fault campaign. It sends only replies, and its moves block it.
 
-Some networks are worse than the driver assumes. The names of these cases begin with "beyond what is
-assumed".
+In some cases of the campaign, the network is worse than the driver assumes. The names of these
+cases begin with "beyond what is assumed".
 """
 
 import socket
@@ -59,8 +59,8 @@ class Board(SimulatedMart):
     def received(self) -> bytes:
         """Always empty, in place of the bytes that the board has received.
 
-        From other boards, the campaign expects a stop as the last bytes. The driver of a MART still
-        sends queries after its last stop, so this check must not be made.
+        For other boards, the campaign checks that the last received bytes are a stop. The driver of
+        a MART still sends queries after its last stop. Empty bytes prevent this check.
         """
         return b""
 
@@ -147,9 +147,9 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Cut the network in both directions.
+    """Cut the network in both directions for ``seconds``. After that, the robot must stop.
 
-    The robot drives on until the controller receives a stop.
+    While the network is cut, the robot drives on, because no stop can reach the controller.
     """
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
@@ -192,7 +192,7 @@ def estop_through_a_restart(rig: Rig) -> None:
 def another_client(said: bytes, rig: Rig) -> None:
     """Let another client start a motion while the robot is at rest. The driver must end the motion.
 
-    ``said``: the datagram with which the client starts the motion.
+    ``said``: the datagram that the client sends to start the motion.
     """
     rig.wait_ticks(350)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
@@ -205,8 +205,8 @@ def another_client(said: bytes, rig: Rig) -> None:
 def imu_dies(rig: Rig) -> None:
     """Let the IMU fail while the robot drives by the command RM, which starts both motors.
 
-    The robot must stop. The stop makes the controller's server hang, so the case restarts the
-    server.
+    The robot must stop. After this stop, the controller's server hangs. So this function restarts
+    the server at the end.
     """
     rig.drive()
     rig.wait_ticks(100)

@@ -27,13 +27,15 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Least number of trials for each kind of receiver and each rate of lost bytes.
 
-These trials are divided among all scenes that end a drive. Only with 1 byte in 100 lost, each of
-the three scenes in ``HURRIES`` gets the whole number.
+This number of trials is divided among all scenes that end a drive. There is one exception: with 1
+byte in 100 lost, each of the three scenes in ``HURRIES`` has at least this number of trials for
+itself.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
 DRIVEN: Final = 150
-"""Number of trials of each script that drives and does not stop. These trials judge no stop."""
+"""Number of trials of each script that drives and does not stop. No stop is judged in these
+trials."""
 OTHER_TRIALS: Final = 20
 """Number of trials of each script with one of the faults ``OTHERS``.
 
@@ -56,8 +58,8 @@ Scores = dict[tuple[str, str, str], Score]
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
     """Yield a name and a kind of board, for each kind on which a scene runs.
 
-    All kinds have the receiver ``receiver``. Several kinds can have the same name; their scores are
-    added.
+    All kinds have the receiver ``receiver``. Several kinds can have the same name. The scores of
+    kinds with the same name are added.
     """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
@@ -112,11 +114,13 @@ def add(total: Scores, more: Scores) -> None:
 
 
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
-    """Return the sum of all scores of the fault ``fault``.
+    """Return the sum of the scores of the fault ``fault``.
 
-    ``receiver``: only scores of this receiver; if empty, those of all receivers.
+    ``receiver``: the receiver whose scores are added. If empty, the scores of all receivers are
+    added.
 
-    ``scene``: only scores of this scene; if empty, those of all scenes except ``DRIVES``.
+    ``scene``: the scene whose scores are added. If empty, the scores of all scenes except
+    ``DRIVES`` are added.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():

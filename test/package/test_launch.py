@@ -225,8 +225,8 @@ def test_the_parameter_file_is_that_of_the_board(
 ) -> None:
     """The argument ``board`` selects the parameter file.
 
-    Without this argument, the user may give a parameter file that sets the parameter ``board``. The
-    driver uses this board.
+    If the user does not give this argument, the user's own parameter file may set the parameter
+    ``board``. Then the driver uses the board of that file.
     """
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
@@ -246,8 +246,8 @@ def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
 ) -> None:
     """The user gives the argument ``board``, and a parameter file that does not name a board.
 
-    The argument selects the board. Otherwise, a robot with another board would get the frames of
-    the default board, the OmniBot.
+    The driver uses the board of the argument. If the argument were ignored, the driver would use
+    the default board, the OmniBot, and its frames.
     """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")

@@ -5,7 +5,8 @@
 Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set.
 
 With Fast DDS, a process that was once a client of a discovery server can no longer find nodes
-without a server. So a test does not do this in its own process: later tests there would fail.
+without a server. So a test does not become a client itself, but runs this program. Otherwise, later
+tests in the same process would fail.
 """
 
 import sys

@@ -79,8 +79,9 @@ def test_a_speed_limit_is_not_taken_for_positional_control(
 ) -> None:
     """``max_linear_speed`` is below a speed that the tool needs. The tool asks for a higher limit.
 
-    With the low limit, the driver would slow down the tool's fast commands. The tool would
-    mistake this for positional control.
+    The reason: the driver would reduce the tool's fast commands to the low limit. The robot would
+    be slower than the tool expects, and the tool would conclude that the board is under positional
+    control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
         assert robot.calibrate("commission", "--only", "board") == 1
@@ -151,9 +152,9 @@ def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
 
 
 def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
-    """A single wheel is reversed.
+    """A single wheel is reversed. No parameter can correct this, only a change of the wiring.
 
-    The error names the wheel, because its wiring must be corrected.
+    The tool's error therefore names the wheel.
     """
     with pytest.raises(ToolError, match="wheel B turns in the opposite direction to the other two"):
         walk("+00", "0-0", "00+")

@@ -106,7 +106,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """``rolled`` with the assumed sizes returns the given path, relative to its first pose."""
+    """``rolled`` with the assumed sizes returns the given path, moved to begin at the origin."""
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
 

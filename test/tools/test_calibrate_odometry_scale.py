@@ -99,7 +99,10 @@ def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
 
 
 class Encoder(TwoWheels):
-    """A robot with a gyro for the heading. Its driver has the parameter ``metres_per_count``."""
+    """A robot whose driver computes distances from encoder counts (``metres_per_count``).
+
+    The driver takes the heading from a gyro.
+    """
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
@@ -115,7 +118,7 @@ class Encoder(TwoWheels):
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
     """The tool finds ``metres_per_count`` and ``linear_scale`` from two straight drives.
 
-    The user measures no turns, because the driver of this board has no scales for its odometry.
+    The user measures no turns: the driver of this robot has no parameter that a turn could correct.
     """
     robot = Encoder()
     console = Console(
@@ -137,7 +140,7 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
     shown: str, found: dict[str, float]
 ) -> None:
-    """If the driver has measured the balance of the motors, the tool writes it to the file.
+    """The tool writes the balance of the motors to the file, if the driver has measured it.
 
     The balance is unknown until the robot has driven forward.
     """

@@ -84,7 +84,7 @@ def test_a_link_whose_device_is_unplugged_is_not_refused(tmp_path: Path) -> None
 def test_a_port_without_descriptor_is_refused_for_a_board_with_several(url: str) -> None:
     """A board has several lines, and one port has no file descriptor. This port is refused.
 
-    The driver polls all lines together, and needs a descriptor for this.
+    The reason: the driver polls all lines together, and needs a descriptor for each of them.
     """
     check_address(url)
     with pytest.raises(ParameterError, match="does not work for a board with several ports"):

@@ -111,7 +111,10 @@ def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Sev
 
 
 def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
-    """Both lines are lost, one after the other. LinkError has the reason of the first line."""
+    """Both lines are lost, one after the other.
+
+    LinkError says why the first line was lost.
+    """
     ends.hang_up(0)
     changed(lines)
     ends.hang_up(1)
@@ -146,9 +149,9 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
 def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A line is full for too long.
+    """A line accepts no data for too long. The next write declares it missing.
 
-    The next write declares it missing, without waiting for a read.
+    The line is missing at once, even if no read follows.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -163,8 +166,8 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 ) -> None:
     """A line's buffer is full, so the driver will close this line and open it again.
 
-    The driver does not share such a line with the guard. The guard would hold the lock of the port,
-    and then the driver could not open the port.
+    The driver does not share a full line with the guard. If it did, the guard would keep the port
+    locked, and the driver could not open the port again.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -217,9 +220,9 @@ def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
 
 
 def test_where_none_can_be_opened_none_is_kept() -> None:
-    """No line can be opened.
+    """No line can be opened. The error gives the reason for the first line.
 
-    The error is that of the first line, and no file descriptor stays open.
+    No file descriptor stays open.
     """
     before = len(os.listdir("/proc/self/fd"))
     paths = "/dev/no-such", "/dev/no-such-either"
@@ -229,7 +232,10 @@ def test_where_none_can_be_opened_none_is_kept() -> None:
 
 
 def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
-    """Both lines have the same port. The second one is missing, because a port is exclusive."""
+    """Both lines have the same port. The first line opens it, and the second line is missing.
+
+    The reason: a port is exclusive, so it cannot be opened twice.
+    """
     with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
         assert "in use" in lines.missing[1]
 

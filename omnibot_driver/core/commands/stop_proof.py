@@ -50,10 +50,10 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether a standstill is proved. It is proved if, since Stop, the robot has stood
-      still for ``still_s``, or if the board has paused. A sent motion command or a measured motion
-      makes this False again.
-    * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
+    * ``proved``: whether a standstill is proved. Two events prove it: the robot stood still for
+      ``still_s`` after Stop, or the board paused. A sent motion command or a measured motion sets
+      the value to False again.
+    * ``owed``: whether the proof is still missing for the last motion command that was sent.
     * ``measured``: whether a measured displacement has arrived since Stop.
     """
 

@@ -233,9 +233,10 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Receive a new order.
+        """Latch or release the board's e-stop, because the driver has a new order for the robot.
 
-        An emergency stop latches the e-stop. Any other order releases it.
+        ``estop``: whether the order is an emergency stop. It latches the e-stop. Any other order
+        releases it.
         """
         if not estop:
             self._obedience.release(self._now)
@@ -275,9 +276,9 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget that the front wheel did not reach its angle, and cancel a requested power-off.
+        """Forget that the front wheel missed its angle, and cancel a requested power-off.
 
-        This happens whenever the user calls ~/start, even during an e-stop.
+        The driver calls this method at each call of ~/start, even during an e-stop.
         """
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()
@@ -303,7 +304,7 @@ class FejemisBoard(Board):
         return self.stop() + self.emergency_stop()
 
     def force_pause(self) -> Packets:
-        """Return the packets of ``pause``, which works in any mode."""
+        """Return the packets of ``pause``. They pause the board in any mode."""
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:

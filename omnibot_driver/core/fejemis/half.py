@@ -41,10 +41,12 @@ The driver subscribes to ``confs`` (steering geometry), and never requests it wi
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
 TOGETHER: Final = ("gyro", "acc")
-"""Streams that are subscribed in one packet, so that the board sends both in the same cycle."""
+"""Streams that are subscribed in one packet, so that the board sends all of them in the same
+cycle."""
 AGAIN_S: Final = 0.5
 ASK_AGAIN_S: Final = 0.1
-"""Time in s between two requests for the heartbeat, while the board may have restarted."""
+"""Time in s between two requests for the heartbeat. The driver sends these requests as long as it
+does not know whether the board has restarted."""
 MANY: Final = 30
 """How many damaged or unknown lines per second are tolerated. The drive board sends about 400 lines
 per second, the front board about 85."""
@@ -88,7 +90,7 @@ class Half:
         if self.role is not None and self.identity is not None:
             self._clocks[self.identity] = self.clock
         self._clock_of: int | None = None
-        """Identity for which ``clock`` was taken; None before the first heartbeat."""
+        """Identity of the board to which ``clock`` belongs; None before the first heartbeat."""
         self.unknown_words.clear()
         self.heartbeat: Heartbeat | None = None
         self.heard_at = -math.inf
@@ -108,8 +110,8 @@ class Half:
     def unsure(self) -> bool:
         """Whether the board may have restarted, and so may have lost the user's settings.
 
-        If the stream that driving requires is missing, a restart is assumed until the next
-        heartbeat. The board's time in that heartbeat shows whether the board has restarted.
+        This is so from the time at which the stream that driving requires is missing, until the
+        next heartbeat. The board's time in that heartbeat shows whether the board has restarted.
         """
         return self._unsure_at is not None
 
@@ -121,8 +123,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        This order matters, because a message that shows a restart makes the half forget the times
-        of the messages before it.
+        The caller must not collect the messages first: a message that shows a restart deletes the
+        board times from before the restart, and the caller needs them for the earlier messages.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

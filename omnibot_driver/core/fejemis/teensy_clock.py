@@ -28,18 +28,19 @@ In this period, a line is accepted however late it is, because it may have waite
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""Largest disagreement of board times, in s, with which the clock still begins anew.
+"""Tolerance in s with which board times must agree, so that the clock begins anew.
 
-The clock begins anew after ``AGAIN`` implausible board times in a row. The last of these times must
-arrive at least ``AGAIN_AFTER_S`` s after the first. From the first time to each of the others, the
-board time must advance as much as the arrival time. ``AGREE_S`` is the tolerance.
+The clock begins anew after ``AGAIN`` implausible board times in a row. Two conditions must hold.
+The last of these times must arrive at least ``AGAIN_AFTER_S`` s after the first. From the first
+time to each of the others, the board time must advance as much as the arrival time, within this
+tolerance.
 """
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s between lines that together make the clock begin anew.
+"""Longest time in s from a line that seems early to the newest such line, if both count together.
 
-A line seems to arrive early if the clock began with a line that was late. After three (``AGAIN``)
-such lines, the clock begins anew. There may be other lines between the three: a line that is late
-itself does not seem early.
+A line seems early if it arrives earlier than the clock predicts. The reason: the clock began with a
+line that was late. After three (``AGAIN``) lines that seem early, the clock begins anew. Other
+lines may arrive between these three lines, because a late line does not seem early.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -70,15 +71,16 @@ class TeensyClock:
         ``_odd``: the first of these times, and its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
-        """Board times that seem early, but are otherwise plausible, each with its arrival time."""
+        """Board times that seem early by the present clock, each with its arrival time. Only times
+        that are plausible otherwise are stored."""
         self._last_s = 0.0
         self.connect()
 
     def connect(self) -> None:
         """Begin a new connection, and keep the times of the board.
 
-        An earlier stall does not concern the new connection: its lines did not wait for the end of
-        that stall.
+        Forget an earlier stall: the lines of the new connection did not wait for the end of that
+        stall.
         """
         self._stalled, self._waited_until = False, -math.inf
 
@@ -132,7 +134,7 @@ class TeensyClock:
         return True
 
     def _is_new_time(self, board_s: float, now: float) -> bool:
-        """Begin anew if enough implausible times in a row agree with each other.
+        """Begin the clock anew if enough implausible board times in a row agree with each other.
 
         Return whether the clock has begun anew.
         """
@@ -152,13 +154,13 @@ class TeensyClock:
         return True
 
     def _began_late(self, board_s: float, now: float) -> bool:
-        """Begin anew if enough lines seemed to arrive early, and their times agree with each other.
+        """Begin the clock anew if enough lines seemed early, and their times agree with each other.
 
         Return whether the clock has begun anew.
 
         In fact, no line can arrive early. But the clock may have begun with a line that had waited
-        for the host. Then lines that did not wait seem early. Without a new beginning, the driver
-        might reject such lines for ever.
+        for the host. Then lines that did not wait seem early. If the clock never began anew, the
+        driver might reject such lines for ever.
         """
         agree = all(
             before_s < board_s
@@ -182,8 +184,9 @@ class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
     The class is a ``ReadingClock``, the interface that gives readings their timestamps. Two
-    timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. To keep this step, a
-    timestamp may be later than the time of the call. In all other cases, it is not later.
+    timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. To ensure this
+    difference, a timestamp may be later than the time of the call. In all other cases, a timestamp
+    is not later than the call.
     """
 
     skew_ppm = 0.0
@@ -194,15 +197,16 @@ class StampedReadings:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the readings of the board's last call, because a new call begins."""
+        """Forget the readings that were added before, because a new call of the board begins."""
         self.readings: list[Reading] = []
         self._stamps: list[float] = []
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
-        """Add a reading with the timestamp ``stamp_s``.
+        """Add a reading, and set its timestamp.
 
-        If ``stamp_s`` is later than ``now``, ``now`` is used instead. The timestamp is then raised
-        if it is not at least ``SMALLEST_STEP_S`` after the last one of the same kind of reading.
+        The timestamp is ``stamp_s``, but at most ``now``. There is one exception: it is always at
+        least ``SMALLEST_STEP_S`` after the last timestamp of the same kind of reading, even if it
+        is then later than ``now``.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

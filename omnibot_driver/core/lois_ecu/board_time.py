@@ -56,10 +56,10 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival time minus board time, as its change in s since the first tick report.
+        """Change of the arrival time minus the board's time since the first tick report, in s.
 
-        The first value assumes that the board's clock always runs. The second value assumes that
-        this clock stops while the board sends.
+        The list has two estimates of this change. The first one assumes that the board's clock
+        always runs. The second one assumes that this clock stops while the board sends.
         """
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
@@ -70,14 +70,17 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """Record that the board sent ``lines`` lines. Its clock may have stopped while it sent."""
+        """Record that the board sent ``lines`` lines.
+
+        The board's clock may have stopped while the board sent these lines.
+        """
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         """Return the delay in s, at least 0, of ticks that arrive at ``now``.
 
-        ``now`` minus the delay is the time of the ticks. It never decreases from one call to the
-        next.
+        The time of the ticks is ``now`` minus the delay. From call to call, the time of the ticks
+        never decreases.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
@@ -141,7 +144,7 @@ def _above_line(kept: Sequence[Point]) -> list[float]:
 
 
 def _line_below(kept: Sequence[Point]) -> Point:
-    """Return slope and height of a straight line that touches the points from below."""
+    """Return slope and height of a straight line that lies above no point and touches one point."""
     half = len(kept) // 2
     points = list(kept)
     # A read may be late but never early, so the line lies below all arrivals. Its slope is that

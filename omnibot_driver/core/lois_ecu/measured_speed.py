@@ -31,11 +31,11 @@ START_STDDEV_TICKS: Final = 0.9
 that the board's odometry (0x20) misses each time a wheel starts."""
 FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses while a
-wheel is faster than ``FAST_TICKS_PER_S``.
+"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses.
 
-The cause: while the board sends, it notices ticks late. If the next tick comes soon after a late
-one, the board measures no speed.
+The odometry misses motion while a wheel is faster than ``FAST_TICKS_PER_S``. The cause: the board
+notices ticks late while it sends data. If the next tick comes soon after a late tick, the board
+measures no speed.
 """
 
 

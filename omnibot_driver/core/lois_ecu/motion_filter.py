@@ -68,7 +68,8 @@ DUTY_STDDEV: Final = 0.3
 REVERSES_S: Final = 0.2
 """Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign.
 
-The board measures the wheel's speed, but not when its direction changes.
+This time is uncertain, because the board does not measure when a wheel's direction changes. It
+measures only the wheel's speed.
 """
 ROLLING_MPS: Final = 1e-6
 
@@ -98,9 +99,9 @@ class MotionFilter:
         self.differing_mps = math.inf
         """Smallest expected difference between the two measured wheel speeds, in m/s.
 
-        It is the minimum since the driver last compared the distance that the board reports with
-        the estimated distance. It matters because the public firmware does not change the reported
-        position while both speeds are equal.
+        The driver searches this minimum anew after each comparison of the distance that the board
+        reports with the estimated distance. The difference matters because the public firmware does
+        not change the reported position while both speeds are equal.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
@@ -192,8 +193,8 @@ class MotionFilter:
 
         ``stddev_m``: standard deviation to add to the distance.
 
-        ``counted``: whether the board was counting the wheel's ticks when the distance became
-        uncertain.
+        ``counted``: whether the board was still counting the wheel's ticks when the distance became
+        uncertain, even if it does not count them now.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -215,9 +216,9 @@ class MotionFilter:
             self.filter.disturb([(state, 1.0)], stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return the states that are wrong if a wheel's estimated distance is wrong by 1 m.
+        """Return the errors of the states if a wheel's estimated distance has an error of 1 m.
 
-        Each state comes with the size of its error.
+        The result has each wrong state, with its error.
         """
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = self._way_terms(index)

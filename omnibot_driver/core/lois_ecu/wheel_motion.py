@@ -21,8 +21,8 @@ X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 ``X``, ``Y``: position in m.
 
 ``TURN``: how much farther the right wheel has rolled than the left one, in m. ``ALONG``: mean
-distance of both wheels, in m. These two states are the values that the board's odometry (0x20) is
-expected to show.
+distance of both wheels, in m. The filter predicts the board's odometry (0x20) from ``TURN`` and
+``ALONG``.
 
 ``BIAS``: index of the left wheel's state; the right wheel's state follows it. The state is the
 error of the wheel's speed.
@@ -36,8 +36,8 @@ CONTROL_RATE: Final = 2.0
 """Assumed rate in 1/s at which the controller reaches a target speed, critically damped."""
 # The user's gains and motors are unknown, so the assumed noise is large.
 PUSH_PER_SPEED: Final = 2.2
-"""Assumed standard deviation of a wheel's acceleration, as a multiple (in 1/s) of ``restless_mps``,
-the largest recent difference between the wheel's speed and its target."""
+"""Ratio, in 1/s, of the assumed standard deviation of a wheel's acceleration to ``restless_mps``.
+``restless_mps`` is the largest recent difference between the wheel's speed and its target."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that uneven ground adds to a wheel's speed, in (m/s)² per s."""
@@ -58,11 +58,11 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Time in s that gives the error of a wheel's distance, if the wheel halts after a new set-point.
+"""Time in s from which the error of a wheel's distance is computed after an early halt.
 
-A wheel that halts soon after a new set-point has not yet reached the speed that the filter assumed.
-The standard deviation of the error is this time, multiplied by ``unsettled_mps``. The first value
-is for the board's own gains, the second for the user's.
+An early halt is a halt soon after a new set-point, before the wheel has reached the speed that the
+filter assumed. The standard deviation of the distance is this time, multiplied by
+``unsettled_mps``. The first value is for the board's own gains, the second for the user's.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -83,8 +83,8 @@ class Step:
     ``rows``: the rows of the transition matrix that differ from the identity matrix. The key is the
     index of the state.
 
-    ``noises``: errors to add. Each error has a variance, and a list of the states that it changes.
-    Each state comes with its factor.
+    ``noises``: independent errors of the step. An error has two values: a list of the states that
+    it changes, each with its factor, and a variance.
     """
 
     dt: float
@@ -99,19 +99,20 @@ class Wheel:
 
     ``base``: index of the wheel's first state in the filter.
 
-    ``blind``: whether the wheel moved, or had a target, in a time in which the board did not count
-    its ticks. The caller sets this flag to False again.
+    ``blind``: whether the wheel moved, or had a target other than zero, while the board did not
+    count its ticks. The attribute remains True until the caller sets it to False.
     """
 
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Rolled distance in m at the last time at which the wheel's motion was certain.
+        """Distance in m that the wheel had rolled when its motion was last certain.
 
-        A command to turn also sets this value when it takes effect. The driver may find out later
-        that the wheel has been at rest since then. It then subtracts the distance that it has added
-        since.
+        The wheel's motion is certain when a new measured speed arrives, when the controller is
+        reset, and when a command starts a wheel whose target was zero. The driver may find out
+        later that the wheel has been at rest since that time. It then subtracts the distance that
+        it has added since that time.
         """
         self.begin_again()
 
@@ -133,7 +134,8 @@ class Wheel:
         self.rolls_on = False
         """Whether the driver ignores the speed that the board reports.
 
-        The board may have measured this speed before the last reset of the controller.
+        The driver ignores this speed after a reset of the controller, as long as the board may have
+        measured it before the reset.
         """
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
@@ -143,8 +145,11 @@ class Wheel:
         ``rolled_mps``: speed of the wheel at this reset, in m/s.
         """
         self.locked = False
-        """Whether the wheel is at rest and gets no power. The reason is that the last measured
-        speed, which the controller still uses, exceeds the target."""
+        """Whether the wheel is at rest, and gets no power because of an old measured speed.
+
+        The controller still uses the last measured speed. This speed exceeds the target, so the
+        controller gives no power.
+        """
         self.rests = False
         """Whether the driver has concluded that the wheel is at rest.
 

@@ -48,29 +48,32 @@ speed of a wheel."""
 
 
 class WindUp:
-    """The wind-up of one robot: the extra distance that its wheel controllers may still drive.
+    """The wind-up of one robot.
 
-    ``way_m``: this distance in m, at the rim of a wheel.
+    ``way_m``: the wind-up as a distance in m, at the rim of a wheel. The wheel controllers may
+    still drive this distance in addition to the commanded motion.
     """
 
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m by which the robot fell behind in one long displacement.
+        """Distance in m by which the robot fell behind in the last, long displacement.
 
-        It is not part of the wind-up yet. If the robot is held in the next displacement too, this
-        distance is added to the wind-up, and then set to 0. None if the robot was not held in the
-        last displacement.
+        A single long displacement does not prove that the robot is held, so this distance is not
+        part of the wind-up yet. If the robot is also held in the next displacement, this distance
+        is added to the wind-up, and the attribute is set to 0.
+
+        The attribute is None if the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
         """Subtract from the wind-up a motion that the set-points do not allow.
 
-        Return whether the wind-up explains this motion. It does if the wind-up, before the
-        subtraction, is larger than the distance of the motion.
+        Return whether the wind-up explains this motion. The wind-up explains it if the distance of
+        the motion is smaller than the wind-up before the subtraction.
 
-        ``way_mps``, ``turn_radps``: excess of the motion over the allowed velocities. The motion
-        lasted ``seconds``.
+        ``way_mps``, ``turn_radps``: by how much the velocities of the motion exceed the allowed
+        velocities. ``seconds``: duration of the motion.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -79,9 +82,9 @@ class WindUp:
         return explained
 
     def carry(self, motion: BodyTwist, seconds: float) -> None:
-        """Add to the wind-up the motion of a robot that is moved by hand.
+        """Add to the wind-up the motion of a robot that someone moves by hand.
 
-        Its set-point is rest.
+        The caller calls this method only while the set-point is rest.
         """
         moved_mps = speed_of(motion) + LEVER_M * abs(motion.yaw_rate_radps)
         self.way_m = min(MOST_M, self.way_m + moved_mps * seconds)
@@ -98,8 +101,8 @@ class WindUp:
 
         If the robot is not held, the wind-up decays.
 
-        ``motion``: mean twist during ``seconds``. The caller has checked that the set-points allow
-        it.
+        ``motion``: mean twist during ``seconds``. The set-points must allow this twist; the caller
+        has checked this.
 
         ``newest``: set-points that the robot may still be approaching, the current one first.
 

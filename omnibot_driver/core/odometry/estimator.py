@@ -25,8 +25,8 @@ from omnibot_driver.core.values import value
 LONGEST_WAIT_S: Final = 1.0
 """Longest time, in s of the board's clock, to wait for a pose that gives the heading.
 
-After that, the driver assumes the heading of the last, unconfirmed pose. Without such a pose, the
-driver assumes heading 0.
+After this time, the driver assumes the heading of the last pose, although no other pose has
+confirmed it. If no pose has arrived, the driver assumes heading 0.
 """
 LONG_GAP_S: Final = 1.0
 """Duration of lost displacements, in s, above which the next displacements wait for a pose that
@@ -37,8 +37,8 @@ by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
-This uncertainty comes only from lost displacements. It lasts until a pose of the board shows the
-lost motion.
+Only lost displacements make the board's heading uncertain. The heading remains uncertain until a
+pose of the board shows the lost motion.
 """
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
@@ -112,7 +112,11 @@ class Odometry:
 
     @property
     def refused_poses(self) -> int:
-        """Number of poses that were impossible, or unexpected and not confirmed by the next one."""
+        """Number of poses of the board that the odometry has refused.
+
+        It refuses impossible poses. It also refuses an unexpected pose if the next pose does not
+        confirm it.
+        """
         return self._belief.refused
 
     def configure(self, settings: OdometrySettings) -> None:
@@ -201,8 +205,8 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Convert ``place`` from the odometry frame into the board's frame.
 
-        The board's heading is not limited to one turn. So the result has the heading that the robot
-        reaches from its current heading by the shorter turn.
+        The board's heading is unwrapped: it can be larger than one turn. Of all headings that mean
+        the same direction, the result has the one that is nearest to the robot's current heading.
 
         Return None if ``use_board_pose`` is False. Also return None while the relation of the two
         frames is unknown, because no pose of the board has shown it.
@@ -231,16 +235,19 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the odometry must adopt the board's frame in which this pose is given.
 
-        This happens at the beginning, and with a pose in a new frame after a suspected restart.
-        A pose is *confirmed* (``confirmed``) if it agrees with the last doubted pose.
+        The odometry must adopt a frame at the beginning, and again if the board has a new frame
+        after a suspected restart. A pose is *confirmed* (``confirmed``) if it agrees with the last
+        doubted pose. The *old frame* is the frame from before the suspected restart.
 
         * While no frame was adopted or assumed: the result is True if the pose is confirmed.
         * Without a suspected restart: the result is False.
         * After a suspected restart, the pose fits the motion since the restart, and fits it better
           than the old frame: the frame is new, and the result is True.
         * After a suspected restart, the pose fits the old frame: the suspicion ends, and the result
-          is False. The same holds for a confirmed pose that the robot can have reached in the old
-          frame.
+          is False.
+        * After a suspected restart, the pose does not fit the old frame, but it is confirmed, and
+          the robot can have reached it in the old frame: the suspicion ends, and the result is
+          False.
         * After a suspected restart, any other pose: the result is True if the pose is confirmed.
         """
         if self._board is None:
@@ -267,8 +274,8 @@ class Odometry:
     def _resume(self, told: Pose, lost_s: float) -> list[OdometryEstimate]:
         """Use a pose of the board to compute the motion of lost displacements.
 
-        Displacements that arrived after the loss, but before the pose, are waiting. They are
-        published now.
+        The displacements that arrived after the loss have waited for this pose. They are published
+        now, too.
 
         ``lost_s``: duration of the gap in s. It is used only if no displacement is waiting.
         """

@@ -63,11 +63,12 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return, for each position where a frame may start, the end of undamaged frames in a row.
+    """Return, for each position where an undamaged frame may start, the end of its row.
 
-    The row consists of the frame at this position and the frames that follow it without a gap.
+    The row consists of this frame and of the undamaged frames that follow it without a gap.
 
-    Keys and values are positions in ``data``. The keys are in descending order.
+    The keys are the positions where the frames start, in descending order. The values are the
+    positions where the rows end.
     """
     size = len(data)
     ends: dict[int, int] = {}

@@ -26,17 +26,18 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """The zeros that are sent before Stop, the emergency stop or a letter.
 
-They have two purposes. If the previous frame lost its end, seven zeros complete it. An eighth zero
-is sent, because one may be lost. The zeros also wake a board; three are enough for this.
+They have two purposes. The first: the previous frame may have lost its end, and seven zeros
+complete it. An eighth zero is sent, because one of the zeros may be lost, too. The second: the
+zeros wake a board. Three zeros are enough for this.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-The previous frame may have lost its end. If the zeros take the place of the lost bytes, the board
-obeys a wrong command. Only a few zeros are sent, so that the motion frame soon replaces the wrong
-command.
+The end of the previous frame may be lost. Then the board takes the zeros for the lost bytes, and
+obeys a wrong command. For this reason, only a few zeros are sent: the motion frame follows soon,
+and replaces the wrong command.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

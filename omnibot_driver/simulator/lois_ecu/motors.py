@@ -105,7 +105,8 @@ class Encoder:
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._level_from = self._level_to = 0.0
-        """Positions of the two ends of the level at the sensor, in periods of the disc."""
+        """Two positions, in periods of the disc: the ends of the level that is now at the
+        sensor."""
         self._per_turn = steps / 2
         self._short = short
         # The distance between two marks has the position errors of both marks. So the error of each
@@ -117,8 +118,9 @@ class Encoder:
     def turn(self, turns: float) -> list[tuple[float, bool, int]]:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
-        An edge has three values: its time as a fraction of the step, whether a long level ended at
-        it, and its direction (1 forward, -1 backward).
+        An edge has three values. The first is its time, as a fraction of the step. The second tells
+        whether the level that ended at this edge was a long one. The third is the direction of the
+        disc: 1 forward, -1 backward.
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn

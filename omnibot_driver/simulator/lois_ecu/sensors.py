@@ -53,8 +53,8 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether the mean is that of the plain numbers, so that the mean of 359 and 1 is
-    180. This mean is wrong near north.
+    ``over_north``: whether the compass averages the numbers as they are. This mean is wrong near
+    north: the mean of 359 and 1 is then 180, not 0.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:
@@ -65,7 +65,7 @@ class Compass:
     def read(self, yaw_rad: float) -> int:
         """Take a reading.
 
-        Return the mean of the last three, in degrees clockwise from north, -179..180.
+        Return the mean of the last three readings, in degrees clockwise from north, -179..180.
         """
         true = 90.0 - degrees(yaw_rad) + self._random.gauss(0.0, self._noise_deg)
         raw = int(true % 360.0) % 360

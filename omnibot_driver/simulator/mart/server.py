@@ -28,7 +28,7 @@ Sender = object
 
 
 class Reply(NamedTuple):
-    """A datagram that leaves ``port`` for ``sender`` at ``at_s``, in s since construction."""
+    """A datagram from ``port`` to ``sender``. ``at_s``: s since the server was constructed."""
 
     at_s: float
     port: int
@@ -43,7 +43,7 @@ class _Later(NamedTuple):
 
 
 class MartServer(ServerState):
-    """The controller with its robot. ``receive`` and ``advance`` let time pass.
+    """The controller with its robot. ``receive`` and ``advance`` move the simulated time forward.
 
     received: the last datagrams at both ports, each with its time and port.
     executed: the last commands that the server began.
@@ -156,7 +156,7 @@ class MartServer(ServerState):
         self._wake()
 
     def watch(self, kind: Kind) -> None:
-        """Supervise motions of ``kind``. No effect if another kind is supervised already."""
+        """Supervise motions of ``kind``; do nothing if another kind is already supervised."""
         if self.alarm is None:
             self.alarm = kind
         self._wake()
@@ -168,7 +168,8 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
 
-        If such a report is already waiting, call ``then`` now.
+        If ``post`` has already kept such a report, because no port waited for it, call ``then``
+        now.
         """
         motion = self.motions[kind]
         if motion.posts:

@@ -35,8 +35,10 @@ def obey(server: "MartServer", text: str) -> None:
 def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop an uncontrolled motion (F, B, RM, R, L).
 
-    Return whether the caller must wait for the end of the motion. A motion that is already stopping
-    is left as it is. The same holds for a drive (F, B, RM) that the server does not supervise.
+    Return whether the caller must wait for the end of the motion.
+
+    This function does not change a motion that is already stopping. It does not stop a drive (F, B,
+    RM) that the server does not supervise.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

@@ -90,7 +90,10 @@ class Motor:
         return turned
 
     def turn(self, counts: float, pwm: float) -> None:
-        """Let an outside force turn the wheel by ``counts`` in one tick, against any effort."""
+        """Let an outside force turn the wheel by ``counts`` in one tick.
+
+        ``pwm``: effort of the motor. It does not change the motion in this tick.
+        """
         self._on_the_way.append(pwm)
         self._on_the_way.popleft()
         self.speed = counts

@@ -62,7 +62,8 @@ def imu_frame(accel: Triple, gyro: Triple) -> bytes:
 def delta_frame(difference: Triple, seq: int) -> bytes:
     """Encode the 9 bytes of the delta frame, which is sent at 25 Hz.
 
-    ``difference``: in 0.1 mm and 0.1 mrad, or wheel counts, as int16.
+    ``difference``: three int16 numbers. They are either a displacement in 0.1 mm and 0.1 mrad, or
+    the counts of the three wheels.
     """
     return _DELTA.pack(0xFF, 0xFB, *difference, seq)
 

@@ -90,7 +90,8 @@ class Console:
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
         """Show the progress of the task ``what`` until the end of the ``with`` block.
 
-        The ``with`` statement gives a function that sets the completed fraction, 0 to 1.
+        The ``with`` statement yields a function. The caller calls it with the completed fraction of
+        the task, 0 to 1.
         """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")

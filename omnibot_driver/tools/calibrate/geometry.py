@@ -190,8 +190,8 @@ def misses(
 
     The first error is with the driver's current geometry.
 
-    The second error is with the geometry ``found``. It uses the mean radius for all three wheels,
-    because the driver has no parameters for single wheels.
+    The second error is with the geometry ``found``, but with its mean radius for all three wheels.
+    The driver could not use three different radii, because it has no parameters for single wheels.
     """
     before: list[float] = []
     after: list[float] = []

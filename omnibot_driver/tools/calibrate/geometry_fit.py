@@ -126,8 +126,8 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
     ``path``: poses that were computed with the assumed radii.
 
-    ``factors``: new radius / assumed radius of each wheel. Either one row for all steps, (3,), or
-    one row for each step, (n - 1, 3).
+    ``factors``: new radius / assumed radius of each wheel. The array has one row for all steps,
+    (3,), or one row for each step, (n - 1, 3).
 
     ``base``: new base radius / assumed base radius.
     """
@@ -135,7 +135,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
 
 def _rolled(rims: Column, factors: Column, base_radius_m: float) -> Column:
-    """Return the pose at the origin, and the pose after each of n - 1 steps, (n, 3).
+    """Return the poses of a path from the origin, (n, 3): the origin, then one pose for each step.
 
     ``rims``: distance that each wheel rolls in each step with the assumed radii, in m, (n - 1, 3).
     """

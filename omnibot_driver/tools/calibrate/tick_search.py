@@ -52,12 +52,12 @@ The load changes slowly. Therefore residuals are correlated even at this distanc
 MISSED: Final = 0.42
 """Limit for the sum of the relative errors of two successive times between ticks.
 
-If the sum is larger, the board missed a mark. The first time is then twice as long as expected. Its
-relative error is 1, and so the sum is about 1. The board's clock can lose up to 6 ms, which makes
-the sum smaller.
+A larger sum means that the board missed a mark. The first time then covers two distances between
+marks, so it is twice as long as expected. Its relative error is 1, and so the sum is about 1. The
+board's clock can lose up to 6 ms, which makes the sum smaller.
 
-The board may also notice a mark late. Then the first time is too long and the second too short, so
-the sum is near 0.
+A sum below the limit can have another cause: the board noticed a mark late. Then the first time is
+too long and the second too short, so the sum is near 0.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which no missed mark is searched for.
@@ -222,7 +222,7 @@ class Search:
     def left(self, values: Column) -> Column:
         """Return the relative residuals for ``values``, without outliers.
 
-        The correlation of the residuals, if it was measured (``correlate``), is removed.
+        If ``correlate`` has measured the correlation of the residuals, this correlation is removed.
         """
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
@@ -231,9 +231,9 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the plant's own values, which are the same in all records.
 
-        The load changes slowly, so it can differ from record to record. The records may then
-        scatter more than the residuals predict. In this case, the covariance is raised until it
-        covers the scatter.
+        The load changes slowly, so it can differ from record to record. Then the results of the
+        records can scatter more than the residuals predict. In this case, this method increases the
+        covariance until it covers the scatter.
         """
         own = 1 + self.order
         found = self._search(values)

@@ -77,7 +77,7 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
 ) -> None:
     """A command expires. The driver sends Stop at 20 Hz.
 
-    It does so for 1 s if the robot is seen at rest, otherwise for 5 s.
+    It sends Stop for 1 s if data shows that the robot is at rest. Otherwise it sends Stop for 5 s.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
@@ -104,8 +104,8 @@ def test_stop_never_waits(stream: Stream) -> None:
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
     """The driver has just repeated the last command when a new command arrives.
 
-    It sends the new command at once. After a repetition, a new command need not wait; after another
-    new command, it may have to.
+    It sends the new command at once. Only an earlier new command can make a new command wait; a
+    repetition cannot.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -129,8 +129,8 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 ) -> None:
     """A letter, such as S (start), is sent while the robot drives. Zeros precede the letter.
 
-    If the board has received part of a damaged frame, the zeros may complete it, and the board
-    obeys a wrong command. So the driver sends the right command again after the letter.
+    The zeros may complete a frame of which the board has received only the first part. Then the
+    board obeys a wrong command. So the driver sends the right command again after the letter.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -222,9 +222,9 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A command ends, so Stop waits to be sent. Then the driver discards the command and Stop.
+    """A motion is halted, so Stop is due. Before Stop is sent, the driver discards it.
 
-    It writes nothing.
+    Afterwards, the driver writes nothing.
     """
     order(stream, GO, 1.0)
     stream.halt(1.0)
@@ -258,8 +258,8 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
 ) -> None:
     """Commands, stops, e-stops and releases come in random order.
 
-    Only commands younger than the timeout are sent, and none during an e-stop. Between the commands
-    of two topics, the driver always sends a Stop.
+    The driver sends only commands that are younger than the timeout. During an e-stop, it sends no
+    commands. Between the commands of two topics, the driver always sends a Stop.
     """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""

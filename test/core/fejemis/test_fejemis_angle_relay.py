@@ -48,8 +48,8 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
     """Two characters of an angle's text are lost. Usually the checksum detects this.
 
-    The checksum can miss it only if the angle is to the right and its text contains a 6. In these
-    cases, the board reads an angle of 0° to 10° to the left. No other wrong angle is possible.
+    The checksum can miss the loss only if the angle is to the right, and its text contains a 6.
+    Then the board reads a wrong angle, which is always 0° to 10° to the left.
     """
     across = 0
     for angle_deg in EVERY:
@@ -107,10 +107,10 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """A board reads no angle beyond 90° from a damaged line without a checksum.
+    """The board reads no angle beyond 90°, even from a damaged line without a checksum.
 
-    Up to three characters of an angle are lost. Beyond 90°, the inner wheel would be faster than
-    the outer one.
+    Up to three characters of the line are lost. The claim is important, because beyond 90° the
+    inner wheel would be faster than the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
@@ -127,12 +127,14 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """The board reads no angle beyond 90°, although the driver adds rounding errors.
+    """The board reads no angle beyond 90°, for any sequence of angles.
 
-    The driver adds the rounding error of each angle to the next angle.
+    The driver adds the rounding error of each angle to the next angle. Nevertheless, no sum exceeds
+    90°.
 
-    The limit also holds for damaged lines. A line with a checksum may lose two characters, so that
-    the checksum does not change. A line without a checksum may lose one character.
+    The limit of 90° also holds for damaged lines. From a line with a checksum, two characters are
+    lost whose loss the checksum does not detect. From a line without a checksum, one character is
+    lost.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

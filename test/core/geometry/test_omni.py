@@ -43,8 +43,9 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 ) -> None:
     """The body twist is computed from wheel rates with the odometry matrix of the manual.
 
-    The manual has two forms of this matrix. The form with the factor 1/(2 cos 30°) is right. In the
-    other form, which is multiplied out, the velocity along x is only 3/4 of the right one.
+    The manual has two forms of this matrix. The form with the factor 1/(2 cos 30°) is right. The
+    other form, which is multiplied out, is wrong: its velocity along x is only 3/4 of the true
+    velocity.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258

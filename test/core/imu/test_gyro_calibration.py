@@ -163,9 +163,9 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """Each gap in the readings restarts a calibration. Gaps come until its time is over.
+    """Each gap in the readings restarts a calibration, so its time limit passes.
 
-    The calibration therefore fails. It leaves the bias as it was, and its message names the gaps.
+    The calibration then fails. It leaves the bias as it was, and its message names the gaps.
     """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
@@ -212,9 +212,9 @@ def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
 def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_stand(
     refine: bool, rolling: Vector3 | None
 ) -> None:
-    """The bias is refined only if refinement is on.
+    """The bias is refined only under two conditions.
 
-    Displacements must also show that the robot is at rest.
+    Refinement must be on, and displacements must show that the robot is at rest.
     """
     calibration = GyroCalibration(NONE, refine=refine)
     stand(calibration, noisy((0.1, 0.1, 0.1), NOISE_RADPS), 10.0, rolling=rolling)
@@ -228,7 +228,7 @@ def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
 ) -> None:
     """For any readings of the gyro, the bias is finite.
 
-    It is never larger than that of a real sensor.
+    It is never larger than the largest bias that a real sensor can have.
     """
     calibration = GyroCalibration(NONE, refine=True)
     if measure:

@@ -90,7 +90,7 @@ def test_wheels_that_roll_back_are_no_restart(
 ) -> None:
     """Wheels roll to and fro at up to 50 RPM, and the counts are signed.
 
-    Whatever the resolution is, no restart of the board is assumed.
+    Whatever the resolution is, the driver does not take falling counts for a restart of the board.
     """
     translation = Translation(LoisEcuSettings(ticks_per_revolution=per_turn))
     for now, ticks in reports(drive, per_turn, unit):
@@ -101,10 +101,11 @@ def test_wheels_that_roll_back_are_no_restart(
 @pytest.mark.slow
 @pytest.mark.parametrize(("per_turn", "unit"), [*zip(PER_TURN, cycle(("ms", "ns")), strict=False)])
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
-    """The robot drives forward at 50 RPM for 6 s, then backward for longer. No restart is assumed.
+    """The robot drives forward at 50 RPM for 6 s, then backward for longer.
 
-    The error of the distance is at most two ticks or 0.03 m, whichever is larger. Then the board
-    restarts, so its counts begin at zero. The driver notices this restart.
+    The driver does not take the falling counts for a restart. The error of the distance is at most
+    two ticks or 0.03 m, whichever is larger. Then the board restarts, so its counts begin at zero.
+    The driver notices this restart.
     """
     ours = LoisEcuSettings(ticks_per_revolution=per_turn)
     translation, odometry = Translation(ours), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -125,9 +126,10 @@ def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit)
 
 @RESOLUTIONS
 def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
-    """Tick counts of nine turns are reset to zero, while the wheels roll on by a quarter turn.
+    """The counts are at nine turns. A reset sets them to zero, while the wheels still roll.
 
-    The counts after the reset, which are near zero, still prove the reset.
+    The wheels roll on by a quarter turn. So after the reset, the counts are not exactly zero, but
+    near it. They still prove the reset.
     """
     proof = ResetProof(Ticks(1000, 9 * per_turn, 9 * per_turn), per_turn, steady=False)
     rolled = math.ceil(per_turn / 4)
@@ -140,9 +142,9 @@ def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
 def test_a_wheel_that_rolls_back_proves_no_reset(
     per_turn: int, before_turns: float, after_turns: float
 ) -> None:
-    """A wheel has rolled by at most one turn. It rolls back until its count is near zero.
+    """A wheel has rolled forward by at most one turn. It rolls back until its count is near zero.
 
-    This does not prove a reset.
+    The driver does not take the small count for a proof that the counts were reset.
     """
     before, after = math.floor(before_turns * per_turn), math.floor(after_turns * per_turn)
     proof = ResetProof(Ticks(1000, before, before), per_turn, steady=False)
@@ -151,9 +153,9 @@ def test_a_wheel_that_rolls_back_proves_no_reset(
 
 @RESOLUTIONS
 def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
-    """A wheel rests near an edge of its encoder. Its count falls from 1 to 0.
+    """A wheel rests near an edge of its encoder. A jolt changes its count from 1 to 0.
 
-    This does not prove a reset.
+    The driver does not take the count of 0 for a proof that the counts were reset.
     """
     proof = ResetProof(Ticks(1000, 1, 0), per_turn, steady=True)
     assert not proof.look(Ticks(1200, 0, 0), 1.2)
@@ -161,10 +163,10 @@ def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
 
 @RESOLUTIONS
 def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
-    """A read is late by 2 s. The clock (in ns) and the counts of its last report are near zero.
+    """A read is late by 2 s. In its last report, the clock (in ns) and the counts are near zero.
 
-    So the board may have restarted before it sent this report, and the clock values do not show
-    when the reports were sent. The driver uses the time of the read as the arrival time of all
+    So the board may have restarted before it sent this report. Therefore, the clock values do not
+    show when the reports were sent. The driver uses the time of the read as the arrival time of all
     reports.
     """
     late_reads = LateReads(per_turn)
@@ -193,9 +195,10 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
     """The user sets a new resolution while the driver waits for the result of a reset.
 
-    After the reset, a wheel rolls on by 250 ticks. With the new resolution, this is a quarter turn,
-    so the count is near zero and proves the reset. With the old resolution, this would be four
-    turns, which would prove nothing.
+    After the reset, a wheel rolls on by 250 ticks. The driver uses the new resolution. By this
+    resolution, 250 ticks are a quarter turn. The count is therefore near zero, and proves the
+    reset. By the old resolution, 250 ticks would be more than four turns, and the count would prove
+    nothing.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

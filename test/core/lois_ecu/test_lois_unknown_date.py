@@ -105,7 +105,10 @@ def test_a_position_without_a_date_is_not_a_fix(
 
 @WORKS
 def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Quirks) -> None:
-    """The driver requests the date until it is known. A date of zeros does not end the requests."""
+    """The GPS sends zeros instead of a date. The driver requests the date every few seconds.
+
+    The requests end only when the GPS reports a date.
+    """
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()

@@ -43,7 +43,10 @@ def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
 
 
 def reach(bench: MartBench, goal: Pose) -> str:
-    """Command the goal, and wait until it is over or discarded. Return the notices as one text."""
+    """Command the goal, and wait until it is over or discarded.
+
+    Return the texts of all notices that came in this time, joined to one text.
+    """
     seen, texts = len(bench.events), list[str]()
 
     def ended() -> bool:

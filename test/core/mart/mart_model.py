@@ -41,8 +41,8 @@ class Driver(NamedTuple):
 
     ``moved``: whether the last motion was a controlled move (``MOVES``).
 
-    ``counted``: whether the driver has read the encoder since the last stop. The reading
-    must come when no late command can do harm any more.
+    ``counted``: whether the driver has read the encoder since the last stop. The driver reads the
+    encoder only when late commands can do no harm any more.
 
     ``greeted``: whether a stop of the driver was confirmed at least once.
 
@@ -78,7 +78,8 @@ Rules = Callable[[State, str, Motion], bool]
 """A function that tells whether a command is allowed in a state and motion. It has the content of
 the driver's table of commands."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
-"""A function that returns all commands that the table of commands allows in a state and motion."""
+"""A function that returns all commands that the table of commands allows. Its arguments are the
+state of the driver, and the motion of the robot."""
 Step = tuple[str, World]
 
 
@@ -216,8 +217,8 @@ def sweeps_first(driver: Driver) -> bool:
 def _asked(world: World) -> Step:
     """Return the step in which the driver finds out which motion is in progress.
 
-    The driver does this after a stop on the stop port. The model has no step in which the reply is
-    lost: after such a step, the world would be the same as before.
+    The driver does this after a stop on the stop port. On a real network, the reply can be lost.
+    The model has no step for this case, because such a step would not change the world.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -288,9 +289,9 @@ def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
 
     ``late``: whether the reply is late, so that it may belong to an earlier command.
 
-    The driver does not take a late reply for the answer to a check, a controlled move or MSM. A
-    check and a move take longer than any reply can be delayed. So a late reply to an earlier
-    command arrives before their own reply can come.
+    A late reply is never taken for the answer to a check, a controlled move or MSM. A check and a
+    move take longer than the longest delay of a reply. So late replies to earlier commands arrive
+    before the answer to the check or move can come.
     """
     driver = world.driver
     state = driver.state

@@ -110,9 +110,9 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """Something, such as a door sill, slows a turn for about a second.
+    """Something, such as a door sill, slows a turn for about a second. Then the turn is free again.
 
-    Afterwards, the robot does not turn much too fast.
+    From then on, the robot may turn a little too fast, but not far too fast.
     """
     bench = MartBench("source").ready()
     if learned:
@@ -155,9 +155,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Turns on the spot do not change the balance of the motors that a drive has shown.
+    """Slow turns on the spot are up to 17 % faster than commanded: motor units are whole numbers.
 
-    Motor units are whole numbers, so slow turns are up to 17 % faster than commanded.
+    The driver does not blame the motors. It keeps the balance that it learned from a drive.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
@@ -264,9 +264,10 @@ def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> N
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
-    """The commanded rate of a turn falls slowly.
+    """The commanded rate of a turn falls slowly, in many small steps.
 
-    The driver restarts a turn only after the rate has stayed the same for a while.
+    The driver does not begin the turn anew at each step. It does so only after the commanded rate
+    has been constant for a while.
     """
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):

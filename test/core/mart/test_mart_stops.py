@@ -43,9 +43,10 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """An e-stop comes during the check of the IMU, or before the start is answered.
+    """An e-stop comes while the driver starts a motion.
 
-    The robot rests and stays at rest.
+    The e-stop comes during the check of the IMU, or before the server has answered the command that
+    starts the motion. The robot is at rest, and stays at rest.
     """
     bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
@@ -112,10 +113,10 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """The network delivers the command of a controlled move twice. The copy comes late.
+    """The network delivers the command of a controlled move twice. The second copy comes late.
 
-    After the move, the server executes this copy too, and does not answer it. An e-stop ends this
-    second move within 1 s.
+    The first move ends. Then the server executes the late copy, so the robot makes a second move,
+    and the server does not answer it. An e-stop ends the second move within 1 s.
     """
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
@@ -134,7 +135,8 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 ) -> None:
     """Two replies come in the wrong order: first the answer to HELLO, then the reply of a move.
 
-    The answer to HELLO does not end the move. Its own reply ends it as usual.
+    The driver does not take the answer to HELLO for the end of the move. The move ends when its own
+    reply arrives.
     """
     bench = MartBench().ready()
     receive = bench.session.inbound.receive
@@ -161,10 +163,10 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The driver stops a turn, but the stop is lost. The reply to it would have been an angle.
+    """The driver stops a turn, but the stop is lost. A reply to the stop would contain an angle.
 
-    Instead, the late reply to an earlier query of the encoder arrives. Its number could be that
-    angle. The driver does not take it for the reply to the stop.
+    Instead of this reply, the late reply to an earlier query of the encoder arrives. It contains a
+    number that could be an angle. The driver does not take it for the reply to the stop.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
@@ -195,9 +197,9 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     start: bytes, twist: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The ok of a start arrives twice. Between the two, the driver sends a stop, which is lost.
+    """The server's "ok" to a start command arrives twice. Before the second "ok", a stop is lost.
 
-    The driver does not take the second ok for the reply to the stop.
+    The driver does not take the second "ok" for the reply to the stop.
     """
     bench = MartBench().ready()
     while not bench.said()[-1].startswith(start):
@@ -262,10 +264,10 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """The driver sends a command to the stop port only some time after a usual stop (SM or SRM).
+    """The driver waits before it uses the stop port. It waits longer than the network delay.
 
-    If the command came directly after the stop, the server could hang. The time is longer than the
-    network delay.
+    The wait begins with the last usual stop (SM or SRM). If a command to the stop port came
+    directly after a usual stop, the server could hang.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
@@ -279,7 +281,7 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 
 
 def test_a_restarted_driver_stops_what_it_meets() -> None:
-    """A driver starts while the robot moves, and stops it.
+    """The robot already moves when a driver starts. The driver stops the robot.
 
     This also works in a controlled move, during which the server does not answer.
     """

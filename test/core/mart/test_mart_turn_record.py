@@ -86,9 +86,9 @@ def downloads(bench: MartBench) -> int:
 
 
 def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
-    """The driver uses the angle that the record gives for "stop detected".
+    """The driver takes the angle from the line "stop detected" of the record.
 
-    This angle includes the coasting of the robot.
+    This angle includes the motion after the stop, in which the robot coasts.
     """
     assert recorded_deg([RECORD], MCR.request("SLOW", 90)) == -91.73
     assert recorded_deg([RECORD.replace(b"\n", b"\r\n")], MCR.request(90)) == -91.73
@@ -221,7 +221,9 @@ def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
 ) -> None:
     """The network duplicates the driver's own request for a record (LAST TURN).
 
-    The user's ~/download_last_move waits until late replies to the copy can no longer arrive.
+    So the server sends the record a second time, later. Before the driver sends the user's request,
+    ~/download_last_move, it waits until such late replies can no longer arrive. So the user gets
+    the right file.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))
@@ -279,8 +281,8 @@ def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> Non
 def test_a_record_makes_the_heading_more_certain_but_not_better_than_the_gyro() -> None:
     """The record of a turn reduces the heading's variance to that of a gyro angle.
 
-    A record with an impossible angle has no effect. A second record of the same turn has none,
-    either.
+    Two records have no effect: a record with an impossible angle, and a second record of the same
+    turn.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)

@@ -66,8 +66,9 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
     """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
 
-    This distance may be up to 20 mm too long, but never too short. The reason is that the first
-    displacement after the reset also contains motion that the board had not reported before.
+    This distance may be up to 20 mm too long, but never too short. It can be too long because the
+    first displacement after the reset also contains motion from before the reset. The board had not
+    reported this motion yet.
     """
     for _ in range(10):
         bench.drive(0.5)
@@ -86,10 +87,10 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_closed(
     bench: Bench,
 ) -> None:
-    """While the connection is lost, a reset of the odometry is refused.
+    """While no data arrives, or the port is closed, a reset of the odometry is refused.
 
-    The robot is pushed in this time, and later data will show this motion. So after a reset, odom
-    would not stay at zero. When data arrives again, the reset succeeds.
+    The robot may be pushed in this time, as here, and later data will show this motion. If the
+    reset were accepted, odom would not stay at zero. When data arrives again, the reset succeeds.
     """
     bench.speaks = False
     bench.run(2.0)
@@ -115,7 +116,8 @@ def test_a_reset_of_the_odometry_during_a_pause_forgets_the_motion_in_the_pause(
 ) -> None:
     """The robot is pushed by 1 m during a pause. Then the odometry is reset and the board started.
 
-    Odom begins at zero, although the board's first displacement contains the push.
+    The board's first displacement after the pause contains the push. Nevertheless, odom begins at
+    zero.
     """
     assert bench.ask(Request.PAUSE, 5.0).success
     push(bench, 1.0, 0.0, 0.3)
@@ -161,7 +163,8 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
     """The robot rolls out while the board is paused. After the pause, odom includes this motion.
 
-    The first twist after the pause is unknown, because the motion's duration is unknown.
+    The board reports the motion without its duration. So the first twist after the pause is
+    unknown.
     """
     bench.drive(0.5)
     bench.run(0.4)
@@ -182,9 +185,9 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """The user commands a curve to the left. The board may have any axis signs.
+    """Odom shows a commanded curve to the left, whatever the signs of the board's axes are.
 
-    Odom shows this curve, although the board starts with a heading of 2 rad.
+    This also holds when the board starts with a heading of 2 rad.
     """
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),

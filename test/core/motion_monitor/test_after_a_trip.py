@@ -21,9 +21,10 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """The wiring is wrong. The user switches the motion monitor off, and the robot drives.
+    """The motion monitor stops a robot with wrong wiring. The user switches the monitor off.
 
-    When the monitor is on again, it stops the robot.
+    Then the robot drives without being stopped. When the user switches the monitor on again, it
+    stops the robot again.
     """
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
@@ -52,10 +53,10 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """The driver rejects displacements, because a motion limit is too low. The monitor is off.
+    """The motion monitor is off. The driver rejects displacements, because a limit is too low.
 
-    The user switches the motion monitor on. After four more rejected displacements, the monitor
-    stops the robot.
+    Then the user switches the monitor on, and the driver still rejects displacements. After four
+    more rejected displacements, the monitor stops the robot.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)
@@ -82,8 +83,9 @@ def test_a_refused_command_says_why() -> None:
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
     """After a stop by the motion monitor, a sender that does not pause cannot move the robot.
 
-    The driver refuses motion commands until a zero command comes. If the monitor stops the robot a
-    second time, only ~/start allows motion again.
+    The driver refuses motion commands until a zero command comes. Then the sender can move the
+    robot again. If the monitor stops the robot a second time, a zero command is not enough: the
+    driver refuses motion commands until ~/start is called.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -103,9 +105,9 @@ def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
 
 
 def test_silence_for_the_timeout_lets_it_move_again() -> None:
-    """The motion monitor stops the robot. Then the sender is silent for the timeout.
+    """The motion monitor stops the robot. Then no command arrives for ``cmd_vel_timeout``.
 
-    Motion is allowed again.
+    After this time, the driver accepts motion commands again.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -117,9 +119,10 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
-    """No command arrives for ``cmd_vel_timeout`` after the first stop by the motion monitor.
+    """After the first stop by the motion monitor, the driver refuses commands.
 
-    The next command would be accepted, so ``/diagnostics`` does not show a refusal.
+    Then no command arrives for ``cmd_vel_timeout``. The driver would accept the next command, so
+    ``/diagnostics`` does not say that commands are refused.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -133,7 +136,8 @@ def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
     """The motion monitor has stopped the robot. Then the driver stalls, and loses commands.
 
-    Only the time after the stall counts as silence of the sender.
+    The time of the stall does not count as silence of the sender. So the driver accepts commands
+    only when the sender has been silent for the timeout after the stall.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -160,9 +164,10 @@ def test_a_stall_of_the_driver_does_not_bring_back_a_refusal_that_has_ended() ->
 
 
 def test_a_longer_timeout_does_not_bring_back_a_refusal_that_has_ended() -> None:
-    """The motion monitor has stopped the robot, and no command came for ``cmd_vel_timeout``.
+    """The driver has refused commands since the motion monitor stopped the robot.
 
-    Then the user sets a longer timeout. The next command is obeyed.
+    No command came for ``cmd_vel_timeout``, so the driver does not refuse commands any more. Then
+    the user sets a longer timeout. The driver still obeys the next command.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -47,7 +47,7 @@ def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
 
 
 def test_the_scales_are_those_of_the_settings() -> None:
-    """The settings have other scales, 100 LSB per m/s and 200 LSB per rad/s. Commands use them."""
+    """The encoder uses the scales of the settings, here 100 LSB per m/s and 200 LSB per rad/s."""
     commands = encoder(linear_scale=100.0, angular_scale=200.0)
     typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
     assert bare(commands.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
@@ -109,9 +109,9 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """A velocity that is a whole number of LSB in each word is sent as exactly these numbers.
+    """The words of a velocity frame are exactly the commanded numbers, if these are whole LSB.
 
-    Velocities with harmful bytes are left out, because the driver changes them.
+    The test leaves out velocities with harmful bytes, because the driver changes them.
     """
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))

@@ -35,7 +35,7 @@ def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None
 
 
 def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
-    """A displacement was wrong. Two poses of the board agree with each other, but not with it.
+    """A displacement was wrong. Two poses of the board agree with each other, and show the error.
 
     The driver corrects the odometry in five steps.
     """
@@ -72,7 +72,7 @@ def test_any_readings_give_finite_estimates_and_never_a_certain_one(
 ) -> None:
     """All estimates are finite, whatever displacements and poses come.
 
-    The variances of x, y and yaw are at least 1e-6, so no estimate seems to be certain.
+    The variances of x, y and yaw are at least 1e-6. So no estimate claims to have no error.
     """
     odometry = Odometry(OdometrySettings(use_board_pose=use_board_pose))
     for number, reading in enumerate(readings):

@@ -55,7 +55,8 @@ def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
 ) -> None:
     """In a word from -20,479 to 20,479, only the low byte can be harmful.
 
-    If it is harmful, the word changes by one LSB, in addition to the rounding.
+    The driver changes a word with a harmful low byte by one LSB. With the rounding, the word
+    differs from the command by at most 1.5 LSB.
     """
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5
@@ -103,9 +104,10 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """A goal's x has a letter as its high byte. The nearest harmless goal could be 0.26 m away.
+    """The high byte of a goal's x is a letter. The driver refuses the goal.
 
-    So the driver refuses the goal.
+    The driver does not send the nearest harmless goal instead, because this goal could be 0.26 m
+    away.
     """
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset if the line"):

@@ -142,9 +142,10 @@ def test_waiting_for_what_does_not_come_ends_with_false() -> None:
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """The thread of a board fails. Both waiting for the board and closing it raise RuntimeError.
+    """The thread of a board fails with an exception.
 
-    The exception in the thread is the cause of this error.
+    Then a call that waits for the board raises RuntimeError, and closing the board raises
+    RuntimeError, too. Each RuntimeError has the exception of the thread as its cause.
     """
 
     class BrokenBoard(Ticker):

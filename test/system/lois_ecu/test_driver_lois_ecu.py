@@ -54,8 +54,8 @@ def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board
     The driver replaces the board's own controller gains, because with these the robot would swerve.
 
     Then the board restarts. The driver writes the gains again, and the robot obeys new commands.
-    The pose in odom continues from its value before the restart. The error is at most 8 cm, or at
-    most 3 sigma if this is more.
+    The pose in odom continues from its value before the restart. At the end, the error of the pose
+    is at most 8 cm, or at most 3 sigma if this is more.
     """
     ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
@@ -131,7 +131,8 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 ) -> None:
     """A user presses the board's button during a drive. The e-stop is latched, and the robot stops.
 
-    Only the service releases the e-stop.
+    When the user releases the button, the e-stop remains latched. Only the service ~/estop releases
+    the e-stop.
     """
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)

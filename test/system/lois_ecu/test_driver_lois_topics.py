@@ -84,8 +84,8 @@ def test_duties_are_commanded_in_duty_mode_and_one_that_waited_is_refused(
 ) -> None:
     """A duty command arrives while the driver is suspended, and is refused when the driver resumes.
 
-    The driver recognises the delay although the message has no timestamp. It obeys later duties,
-    and limits them to ``max_duty``. The duties expire like other commands.
+    The driver knows that this command waited, although the message has no timestamp. It obeys later
+    duties, and limits them to ``max_duty``. The duties expire like other commands.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
@@ -112,7 +112,10 @@ def test_duties_are_commanded_in_duty_mode_and_one_that_waited_is_refused(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A user sets a terminal mode and then a drive mode. The topics of each mode appear."""
+    """A user sets a terminal mode. Its topic appears.
+
+    Then the user sets a drive mode, while the driver runs. The topic of this mode appears, too.
+    """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
     probe.wait_for_state("nominal")
@@ -134,7 +137,8 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 def recorded(robot: Any) -> Path:
     """Record while the robot drives, and return the path of the record.
 
-    A busy computer may stop the robot early. In that case the function tries again.
+    If the computer is busy, the robot may stop early, and the record fails. Then this function
+    records again, at most ten times in all.
     """
     for _ in range(10):
         try:

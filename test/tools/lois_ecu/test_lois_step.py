@@ -178,10 +178,11 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """On a board that sends data during a step, the overshoot is only a little larger than tuned.
+    """Data that a board sends during a step makes the overshoot only a little larger.
 
-    Sending delays the board's controller. The gains are tuned for an overshoot of at most 5 %. Of
-    the overshoots with a sending board, 95 % are below 8 %.
+    The reason for the larger overshoot: the board's controller is delayed while the board sends.
+    The tuned gains have an overshoot of at most 5 % if the board does not send. If it sends, 95 %
+    of the overshoots are below 8 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
@@ -248,7 +249,8 @@ def test_a_step_is_predicted_as_the_simulated_board_makes_it(
 ) -> None:
     """The tool's prediction of a step agrees with the step of a simulated board.
 
-    This holds for each firmware, although its controller may run 11 or 5 times a second.
+    The firmwares run their controllers at different rates, 11 or 5 times a second. The prediction
+    agrees for each firmware.
     """
     motor = MotorSettings(
         rpm_per_percent=0.66,
@@ -293,10 +295,10 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """The tool refuses a record whose numbers have overflowed, because the times are unknown.
+    """The tool refuses a record in which every time is the largest number that the record can hold.
 
-    The unit of the manual is 100 ns. A number of the record can be at most 6.6 ms in this unit, and
-    the usual times between ticks are longer.
+    The true times may be longer, so they are unknown. With the unit of the manual (100 ns), the
+    largest number means 6.6 ms. The usual times between ticks are longer than this.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
