@@ -29,10 +29,10 @@ KNOWN_TYPES: Final = frozenset(kind.value for kind in rclpy.Parameter.Type)
 
 
 def declare(node: Node) -> dict[str, Any]:
-    """Declare all parameters on the node, and return their values at start.
+    """Declare all parameters on the node, and return their values at the driver's start.
 
-    Values in the calibration file replace those that the user gives. Raises ParameterError for a
-    wrong value.
+    If the user and the calibration file both give a value, the one in the calibration file is used.
+    Raises ParameterError for a wrong value.
     """
     given = {
         name: override.value
@@ -54,8 +54,9 @@ def declare(node: Node) -> dict[str, Any]:
 def set_each(node: Node, request: Any, response: Any) -> Any:
     """Serve rcl_interfaces/SetParameters: set each parameter that is valid.
 
-    rclpy's own callback raises an exception for a value of an unknown type, which would end the
-    driver. For an unknown name, its answer does not say what is wrong.
+    This function replaces rclpy's own callback for two reasons. First, for a value of an unknown
+    type, that callback raises an exception, which would end the driver. Second, its answer for an
+    unknown parameter name does not say what is wrong.
     """
     response.results = [_set(node, [message]) for message in request.parameters]
     return response

@@ -296,9 +296,10 @@ def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None
 def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
     kind: str, unit: str, fastest: float
 ) -> None:
-    """A speed limit above the fastest possible speed is refused.
+    """The driver refuses a speed limit that is above the fastest possible speed.
 
-    Otherwise odometry would reject every displacement of a fast robot, without a message.
+    Without this check, the odometry would reject every displacement of a fast robot, without a
+    message.
     """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest

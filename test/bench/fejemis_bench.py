@@ -37,16 +37,16 @@ from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
 BESIDE: Final = (0, 2, 4)
-"""How many other processes are busy in each of the measurements."""
+"""Numbers of other busy processes. The delays are measured once with each of these numbers."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both simulated boards in real time; then send a list of delays in s to ``results``.
+    """Run both simulated boards in real time. Then send a list of delays in s to ``results``.
 
-    A delay begins when the front board reports an angle. It ends when the drive board receives
+    A delay is the time from the front board's report of an angle until the drive board receives
     this angle from the driver. The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()
@@ -112,9 +112,9 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return the sorted delays of the angles in ms, while ``busy`` other processes compute.
+    """Return how long the driver takes to relay each angle, in ms, as a sorted list.
 
-    Angles of the first 3 s are left out.
+    Meanwhile, ``busy`` other processes compute. Angles of the first 3 s are left out.
     """
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
@@ -136,10 +136,11 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Measure the delays; return a list of figures, which is empty, and the rows of a table.
+    """Measure the delays. Return an empty list of figures, and the rows of a table.
 
-    The benchmarks of other boards return figures that compare the driver with the floor, the
-    smallest program with the same output. The Fejemis has no floor, so it has no such figures.
+    The benchmarks of other boards return figures that compare the driver with the floor: the
+    smallest program with the same output. The Fejemis has no floor, so its list of figures is
+    empty.
     """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",

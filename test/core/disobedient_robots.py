@@ -58,10 +58,10 @@ def goes_astray(bench: Bench, command: Triple) -> bool:
 def stopped_after_s(
     bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
 ) -> float:
-    """Command the robot until the driver sends Stop.
+    """Command the robot until the driver sends Stop. Return how long the driver takes, in s.
 
-    Return the time in s between two events: the robot first deviates from the command, and the
-    driver sends Stop. If Stop comes first, the call fails.
+    This time begins when the robot first deviates from the command, and ends with the driver's
+    Stop. If Stop comes before a deviation, the call fails.
     """
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick

@@ -102,7 +102,8 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
     """The board sends nothing, but the driver still predicts odometry.
 
-    Predicted odometry is not data from the board, so the driver refuses commands.
+    A prediction is not data from the board. So the driver still regards the board as silent, and
+    refuses commands.
     """
     bench.drive_on()
     bench.speaks = False

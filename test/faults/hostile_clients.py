@@ -82,7 +82,7 @@ def flood_of_releases(rig: Rig) -> None:
 def everybody_calls_at_once(rig: Rig) -> None:
     """Call every service five times while the driver reconnects to the board.
 
-    Each call must be answered, and none may move the robot.
+    The driver must answer each call. No call may move the robot.
     """
     rig.drive()
     rig.hand.leave()

@@ -21,7 +21,10 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time in s from which a scene can drive: the board runs, and the driver knows that it runs."""
+"""Earliest time in s at which a scene can drive.
+
+At this time, the board runs, and the driver knows that it runs.
+"""
 STANDS_S: Final = 1.2
 """Time in s from the last command until the robot must be at rest."""
 ESTOPPED_S: Final = 0.3
@@ -107,7 +110,7 @@ def _common(random: Random) -> dict[str, object]:
 
 
 def _leg(random: Random) -> tuple[list[Command], float]:
-    """Return the commands of one drive, and the time in s of the last command."""
+    """Return the commands of one drive, and the time in s at which the last of them is sent."""
     wishes = driving(random, FROM_S, FROM_S + random.uniform(0.1, 0.35), by_wheels=_wheels(random))
     return wishes, wishes[-1].at_s
 

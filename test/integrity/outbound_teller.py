@@ -2,8 +2,8 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-A moving robot always has the twist of the driver's last motion command, even if the line has
-damaged this command. So the readings do not show the damage to the driver.
+A moving robot always has the twist that the driver commanded last. It has this twist even if the
+line has damaged the command. So the driver cannot see the damage in the readings.
 """
 
 import math

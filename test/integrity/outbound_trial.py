@@ -35,10 +35,10 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
-A key has the bytes that the receiver held before, whether the line was idle then, and the new
-bytes. A value has the bytes that the receiver holds afterwards, and the frames that it found, each
-with the position of its last byte. The value is ``None`` if the receiver has found a letter (S, P
-or R) in the bytes.
+A key has three items: the bytes that the receiver held before, whether the line was idle at that
+time, and the new bytes. A value has two items: the bytes that the receiver holds afterwards, and
+the frames that it has found. Each frame comes with the position of its last byte. If the receiver
+has found a letter (S, P or R) in the bytes, the value is ``None``.
 """
 
 

@@ -100,11 +100,11 @@ def shared(_ros: None) -> Iterator[tuple["PtyBoard", Driver]]:
 def shared_probe(
     shared: tuple["PtyBoard", Driver], probe_of: Callable[[Driver], Probe]
 ) -> Iterator[Probe]:
-    """A probe of the shared driver.
+    """A probe of the shared driver, for one test.
 
-    At the beginning of the test, the robot is at rest, and the e-stop is not latched. The lists of
-    the board's commands and of the driver's output are empty. At the end of the test, the fixture
-    latches the e-stop.
+    When the test begins, the robot is at rest, and the e-stop is not latched. Two lists are empty:
+    the commands that the board has received, and the output of the driver. At the end of the test,
+    the fixture latches the e-stop.
     """
     board, driver = shared
     probe = probe_of(driver)

@@ -41,14 +41,14 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    ``imu_sent``, ``odom_sent``: number of frames that the board sent, counted from the first frame
-    that the driver published.
+    ``imu_sent``, ``odom_sent``: number of frames that the board sent. The count begins with the
+    first frame that the driver published.
 
-    ``imu_wrong``, ``odom_wrong``: messages that match no frame.
+    ``imu_wrong``, ``odom_wrong``: number of messages that match no frame.
 
-    ``worst_m``, ``worst_rad``: largest error of ``odom`` against the pose of the board.
+    ``worst_m``, ``worst_rad``: largest difference between ``odom`` and the pose of the board.
 
-    ``last_m``, ``last_rad``: error of ``odom`` in the last message.
+    ``last_m``, ``last_rad``: this difference in the last message.
     """
 
     seconds: float

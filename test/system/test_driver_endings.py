@@ -47,8 +47,9 @@ driver.LONGEST_END_S = 50.0
 """
 """Code that makes the driver wait longer at its end, before it gives up.
 
-This is necessary because on a busy computer, the board's report of a standstill comes late. The
-limits do not delay a test, because the driver waits only until the report arrives.
+On a busy computer, the board's report of a standstill comes late. So the driver must wait longer
+for this report. The longer limits do not delay a test, because the driver waits only until the
+report arrives.
 """
 
 
@@ -134,20 +135,20 @@ node.OmniBotDriver._on_estop_topic = hold
 join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20 * timeout)
 """
-"""Code that blocks the executor's thread in a callback.
+"""Code with a callback that blocks the executor's thread.
 
-The callback returns when the driver has asked the executor to end.
-The code also gives the driver's threads more time to end.
+The callback returns only after the driver has asked the executor to end. The code also gives the
+driver's threads more time to end.
 """
 
 
 def test_a_pending_service_answers_although_the_executor_learns_of_its_result_late(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A user calls ``~/reset``. The driver ends before the board has finished the reset.
+    """A user calls ``~/reset``, and the driver ends before the board has finished the reset.
 
-    A callback blocks the executor while the driver ends. Nevertheless, the user gets an answer: the
-    driver is shutting down.
+    A callback blocks the executor while the driver ends, so the executor learns of the result late.
+    Nevertheless, the user gets an answer: the driver is shutting down.
     """
     board = start_board(boot_time_s=1000.0, running=True)
     driver: Driver = start_driver(board.path, before=HOLDS_THE_EXECUTOR)

@@ -193,9 +193,9 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
 def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """One of two lines is missing. The driver reports which one.
+    """One of two lines is missing, and the driver reports which one.
 
-    The driver's guard process uses the other line.
+    The driver's guard process uses the line that is not missing.
     """
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"

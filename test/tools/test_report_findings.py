@@ -75,9 +75,9 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """The board is lost for a while. The report mentions the loss once, from the driver's state.
+    """The board is lost for a while. The report mentions this loss once, from the driver's state.
 
-    The gaps in the board's data are not reported in addition.
+    The loss also causes gaps in the board's data. The report does not mention these gaps as well.
     """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
@@ -152,7 +152,7 @@ def test_a_gap_at_the_end_begins_at_a_timestamp_too(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """Half of the IMU readings are missing: every other one. The report calls the rate wrong.
+    """Every second IMU reading is missing. The report says that the rate is wrong.
 
     It does not report gaps.
     """
@@ -200,7 +200,10 @@ def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
 
 
 def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
-    """All IMU messages arrive 30 s after their timestamps. A single finding reports this delay."""
+    """All IMU messages arrive 30 s after their timestamps.
+
+    The report has only one finding about this delay.
+    """
     drive.imu.late_s = drive.imu.late_s + 30.0
     (clock,) = troubles(drive)
     assert "30 s after its stamp" in clock.text
@@ -210,8 +213,9 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
 def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: float) -> None:
     """The recorder's clock is 3 s ahead of the robot's clock, or 3 s behind it.
 
-    The robot drives as commanded, and after the drive, the e-stop is latched. The report names only
-    the clock. It does not say that the robot moved without a command, or against one.
+    The robot drives as commanded. After the drive, the e-stop is latched. The report names only the
+    difference of the clocks. It does not say that the robot moved without a command, or that it
+    moved against a command.
     """
     drive = Drive(estops=[(0.0, False), (16.5 + ahead_s, True)])
     for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):
@@ -236,16 +240,16 @@ def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
 
 
 def test_nothing_but_nan_is_told(drive: Drive) -> None:
-    """All messages have NaN. The report names IMU, odometry and commands."""
+    """Every message contains NaN. The report names all three kinds: IMU, odometry and commands."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
 
 
 def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
-    """The driver refuses commands because of the e-stop, and warns of this.
+    """The driver refuses commands because of the e-stop. Its diagnostics warn of the refusal.
 
-    The report omits the warning. It shows the driver's warnings of other refusals.
+    The report omits this warning. It shows warnings about refusals that have other reasons.
     """
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
@@ -298,9 +302,9 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """Some messages have no timestamp.
+    """Some messages have no timestamp, although the driver stamps all its messages.
 
-    The report mentions them, because the driver stamps all its messages.
+    The report mentions the messages without a timestamp.
     """
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan

@@ -24,7 +24,7 @@ TOLERANCE = 0.01
 
 
 def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
-    """Return eight steps of a wheel that behaves like the model, with measurement noise."""
+    """Return eight steps of a simulated wheel: the response of ``model`` with noise."""
     random = np.random.default_rng(seed)
     steps = []
     for number in range(8):
@@ -180,9 +180,9 @@ def test_lost_deltas_are_left_out() -> None:
 
 
 def test_odometry_that_was_lost_is_said() -> None:
-    """The odometry ends after five deltas, so no step is complete.
+    """The odometry ends after five deltas, so the log has no complete step.
 
-    ``steps_of`` raises ToolError.
+    ``steps_of`` therefore raises ToolError.
     """
     commands, wheels = steps_to_and_fro(MotorConstants(), steps=2)
     silent = replace(

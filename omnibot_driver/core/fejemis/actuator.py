@@ -2,8 +2,8 @@
 
 """Sends the motion lines (``rc``) to both boards, and repeats them.
 
-Each new measured angle of the front wheel causes an extra repetition in two cases: while this angle
-limits the speed, and while lines have no checksum.
+In two cases, the lines are also repeated after each new measured angle of the front wheel: if this
+angle limits the speed, or if the lines have no checksum.
 
 The module knows when a line is due; it does not know what the line contains.
 """
@@ -54,9 +54,9 @@ class PairStream(SetpointStream):
         super().apply(wanted, now)
 
     def angle_told(self, angle_rad: float, now: float) -> bool:
-        """Receive the front wheel's angle in rad; return whether a new fault of the wheel is found.
+        """Receive the front wheel's angle in rad; return whether it shows a new fault of the wheel.
 
-        The fault is that the wheel does not follow its commanded angle.
+        The wheel has a fault if it does not follow its commanded angle.
         """
         if self.driving and self._pair.restless:
             self._said_at = -math.inf

@@ -83,9 +83,10 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        True while the angle limits the speed, because the limit changes with the angle. Also true
-        without checksums, because a board may then obey a damaged line. The next angle comes after
-        15 ms, and the lines that follow it replace the damaged line.
+        It is true in two cases. In the first case, the angle limits the speed, so the limit changes
+        with the angle. In the second case, the lines have no checksums, so a board may obey a
+        damaged line. The next angle comes after 15 ms, and the lines that follow it replace the
+        damaged line.
         """
         return self.held or not self._pair.with_sums
 
@@ -111,9 +112,9 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist of the robot's body that ``packets`` command.
 
-        The caller passes packets that were sent. If they are the last result of ``encode``, the
-        twist is the one at the front wheel's angle that ``encode`` used. Other packets, and packets
-        that are passed a second time, are regarded as a stop.
+        The caller passes packets that were sent. If they are the last result of ``encode``, and are
+        passed for the first time, the result is the twist that ``encode`` has computed for the
+        front wheel's angle. All other packets are regarded as a stop.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

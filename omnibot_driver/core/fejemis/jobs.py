@@ -34,15 +34,24 @@ ANSWERED_WITHIN_S: Final = 4.5
 """``CALIBRATED_WITHIN_S``: longest duration of a calibration in s, from the user's request.
 ``ANSWERED_WITHIN_S``: longest duration of any other job. After this time, the job has failed."""
 CALIBRATION_S: Final = 1.2
-"""Duration of a calibration in s; the board averages its readings for about a second."""
+"""Duration of a calibration in s. In this time, the board averages its readings for about a second.
+"""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How many times the driver sends the command of a job. Calibrations have their own limit."""
+"""How many times the driver sends the command of a job.
+
+For a calibration, CALIBRATIONS is the limit.
+"""
 UNCHANGED_S: Final = 2.4
-"""Time in s since a command to calibrate. If the offsets are still unchanged after this time, the
-command was probably lost."""
+"""Time limit in s for a change of the offsets, counted from a command to calibrate.
+
+If the offsets are still unchanged after this time, the command was probably lost.
+"""
 CALIBRATIONS: Final = 2
-"""How often a calibration is commanded at most, if the offsets stay unchanged."""
+"""Largest number of commands to calibrate in one job.
+
+The driver sends another command only if the offsets stay unchanged.
+"""
 
 Lines = dict[Role, list[bytes]]
 OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
@@ -56,7 +65,7 @@ reports the offsets."""
 def whole_seconds(delay_s: float) -> int:
     """Return the delay in whole seconds, at least 1.
 
-    The delay is increased until the checksum detects the loss of any two of its digits.
+    The delay is increased until the checksum detects the loss of any two digits of the delay.
     """
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
@@ -144,7 +153,7 @@ class Jobs:
     def restarted(self, role: Role) -> None:
         """End the running job as failed, because the board ``role`` has restarted.
 
-        A power-off continues if the front board has restarted.
+        A power-off needs only the drive board, so it continues if the front board has restarted.
         """
         if role == "front" and self.job is Job.POWER_OFF:
             return
@@ -278,9 +287,10 @@ class Jobs:
 def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    ``eer`` is the command to load the configuration. The board does not answer it. So the driver
-    then sends a query: ``confi`` to the drive board, ``fwoi`` to the front board. An answer shows
-    that the board receives lines. A front board that does not know ``fwoi`` answers "unhandled".
+    The board does not answer ``eer``, the command to load the configuration. So the driver then
+    sends a query: ``confi`` to the drive board, ``fwoi`` to the front board. An answer to this
+    query shows that the board receives lines. The answer "unhandled" counts too: it comes from a
+    front board that does not know ``fwoi``.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

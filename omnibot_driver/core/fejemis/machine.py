@@ -28,10 +28,10 @@ once.
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Lower limit of the voltage that the driver sends to the lift, as a fraction of the commanded one.
+"""Smallest voltage that the driver sends to the lift, as a fraction of the commanded voltage.
 
-The driver sends a lower voltage than the user commands if the checksum could not detect damage to
-the line with the commanded voltage.
+If the checksum could not detect damage to the line with the commanded voltage, the driver sends a
+lower voltage instead.
 """
 LEAST_TIME_S: Final = 0.04
 
@@ -53,9 +53,9 @@ class Machine:
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
         """``_lift_at``: time in s at which to send the line for the lift.
 
-        ``_lift_again_at``: earliest time of the next such line.
+        ``_lift_again_at``: earliest time in s at which to send another line for the lift.
 
-        ``_lift_until``: time at which the lift's motion ends.
+        ``_lift_until``: time in s at which the lift's motion ends.
         """
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0

@@ -3,8 +3,9 @@
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
 A line has a speed and a turn rate. The front board uses only their ratio. The drive board uses only
-the root of the sum of their squares. So several lines give the same motion. Of the lines in
-which such a loss is detected, the module selects the one that is nearest to the command.
+the square root of the sum of their squares. So several lines command the same motion. The module
+considers the lines in which the checksum detects such a loss, and selects the line that is nearest
+to the command.
 """
 
 import math
@@ -18,19 +19,25 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Lower limit of the commanded speed, in m/s, for a curve in the front board's line. If the
-commanded speed is lower, the line has the speed 0: only few smaller numbers can be sent safely."""
+"""Lowest commanded speed, in m/s, at which the front board's line for a curve has a speed above 0.
+
+If the commanded speed is lower, the speed in the line is 0, because only few smaller numbers can be
+sent safely.
+"""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""
 ANGLE_COST: Final = 1e4
-"""Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle. For
-comparison: a speed that is wrong by a factor of 2.7 (e) costs 1."""
-SLOWEST: Final = 30.0
-"""Limit of the linear speed in the drive board's line.
+"""Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle.
 
-The linear speed is at least the outer wheel's speed divided by this number. In forward motion, it
-can also be 0. In backward motion, it is never 0, because its sign gives the direction.
+For comparison: a line whose speed is wrong by a factor of 2.7 (e) costs 1.
+"""
+SLOWEST: Final = 30.0
+"""Largest ratio of the outer wheel's speed to the linear speed in the drive board's line.
+
+So the linear speed is at least the outer wheel's speed divided by this number. In forward motion,
+the linear speed can also be 0. In backward motion, it is never 0, because its sign gives the
+direction.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
@@ -95,9 +102,9 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the line with the lowest cost whose checksum would reveal damage to the line.
+    """Return the line with the lowest cost among the lines whose checksum would reveal damage.
 
-    If no line has such a checksum, return the one with the lowest cost of all.
+    If there is no such line, return the line with the lowest cost of all lines.
 
     ``signs``: the signs of speed and turn rate, as text.
     """

@@ -2,9 +2,11 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-For a pause, and for its own e-stop, the driver sends ``stop``. After an e-stop, it sends ``start``
-by itself. After a pause, it sends ``start`` only if the user requests it. The module knows times
-and rcSource, the source of the commands that the board obeys; it does not know lines.
+The driver sends ``stop`` for a pause, and for its own e-stop. After the release of the e-stop, the
+driver sends ``start`` by itself. After a pause, it sends ``start`` only if the user requests it.
+
+The module knows times and rcSource, the source of the commands that the board obeys; it does not
+know lines.
 """
 
 import math
@@ -66,7 +68,7 @@ class Obedience:
     def pause(self) -> None:
         """Record that the user requested a pause.
 
-        If ``start`` was due because an e-stop was released, it is no longer due.
+        If ``start`` was due because an e-stop was released, the pause cancels this ``start``.
         """
         self.pause_said = True
         self.start_at = math.inf
@@ -74,7 +76,7 @@ class Obedience:
     def release(self, now: float) -> None:
         """Release the driver's e-stop. ``start`` becomes due if the board obeyed before the e-stop.
 
-        After a pause that the user requested, ``start`` does not become due.
+        If the user has requested a pause, ``start`` does not become due.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf

@@ -12,10 +12,10 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of unknown lines in the diagnostics.
+"""Largest number of unknown lines that the diagnostics show.
 
-An unknown line is a line from the driver that the firmware has answered as unknown. The diagnostics
-show the latest of these lines.
+An unknown line is a line that the driver has sent, and that the firmware has reported as unknown.
+If there are more such lines, the diagnostics show the latest ones.
 """
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
@@ -23,7 +23,9 @@ SUMS: Final = {True: "on", False: "off", None: "unknown"}
 def figures(
     ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None, trouble: str
 ) -> BoardFigures:
-    """Return counters and other values for diagnostics; the counters continue over all connections.
+    """Return counters and other values for diagnostics.
+
+    A new connection does not reset the counters.
 
     ``source``: the source of the motion commands that the drive board obeys (rcSource).
 

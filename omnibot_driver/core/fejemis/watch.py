@@ -19,13 +19,17 @@ NO_ANGLE_S: Final = 0.25
 """Time in s without an angle of the front wheel, after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
-"""Time in s from the opening of the ports. If one board is still silent after this time, and the
-other one sends, the driver notifies the user that the first one is missing."""
+"""Time limit in s, from the opening of the ports, for the first data of both boards.
+
+If one board is still silent after this time, and the other board sends, the driver notifies the
+user that the silent board is missing.
+"""
 UNREAD_S: Final = 0.03
 """Longest time in s for which the driver normally reads no line of either board.
 
-Each board sends at least every 15 ms. After a longer time, the driver has read late, or both boards
-are cut off. So the driver does not blame one board for the missing data.
+Each board sends at least every 15 ms. If the driver has read nothing for a longer time, it has read
+late, or the connection to both boards is interrupted. So the driver does not blame one of the
+boards for the missing data.
 """
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
@@ -36,9 +40,10 @@ SLACK_S: Final = 1e-6
 
 
 class Watch:
-    """The timeouts of a Fejemis: a silent board, an old angle of the front wheel, an old pose.
+    """The timeouts of a Fejemis: for each board's data, for the front wheel's angle, for the pose.
 
-    ``blind``: whether the front wheel's angle is too old, or its sensor is faulty.
+    ``blind``: whether the last angle of the front wheel is too old, or the wheel's sensor is
+    faulty.
 
     ``unposed``: whether the last pose is too old.
     """
@@ -79,7 +84,7 @@ class Watch:
 
     @property
     def wake_at(self) -> float:
-        """Time in s at which the last angle or pose becomes too old."""
+        """Time in s at which the next timeout expires: for the front wheel's angle, or the pose."""
         times = [math.inf]
         drive = self._ports.half("drive")
         if not self.blind:
@@ -131,8 +136,9 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, the driver does not blame one board for missing data during the next ``OLDEST_S``:
-        the data may have arrived already, and the driver reads it in this time.
+        If so, the missing data may have arrived without being read. The driver reads this data
+        during the next ``OLDEST_S``. In this time, it does not blame one of the boards for missing
+        data.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

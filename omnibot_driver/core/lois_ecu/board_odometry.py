@@ -41,7 +41,7 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each odometry report with the previous one.
+    """Reader of odometry reports, which compares each report with the previous one.
 
     ``rpm_mps``: speed of a wheel's rim at 1 RPM, in m/s.
     """

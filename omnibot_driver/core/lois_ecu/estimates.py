@@ -57,9 +57,9 @@ class Estimates:
         self.pose, self._ways_m = Pose(), (0.0, 0.0)
 
     def conclude(self, at_s: float, may_roll_mps: tuple[float, float]) -> FusedOdometry:
-        """Return the estimate at ``at_s``, the time of the filter's state.
+        """Return the estimate at ``at_s``, the time of the filter's state, and store its pose.
 
-        Also store its pose: the next estimate's displacement is measured from this pose.
+        The displacement of the next estimate begins at the stored pose.
 
         ``may_roll_mps``: see ``now``.
         """
@@ -88,9 +88,9 @@ class Estimates:
     def now(
         self, stamp_s: float, unheard_s: float, may_roll_mps: tuple[float, float]
     ) -> FusedOdometry:
-        """Return the estimate at ``stamp_s``. This call has no effect on the next estimate.
+        """Return the estimate at ``stamp_s``. This call has no effect on later estimates.
 
-        ``unheard_s``: time in s from the filter's state to ``stamp_s``.
+        ``unheard_s``: time in s between the time of the filter's state and ``stamp_s``.
 
         ``may_roll_mps``: greatest possible speed of each wheel during ``unheard_s``, in m/s.
         """

@@ -76,17 +76,17 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` return RPM 0/0 before the next set-points, as after a Stop."""
+        """Make ``wheels`` return RPM 0/0 before the next set-points, just like after a Stop."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
     def cleared(self) -> bool:
-        """Whether RPM 0/0 was sent often enough since the last motion."""
+        """Whether RPM 0/0 was sent as many times as necessary since the last motion."""
         return not self._clears_left
 
     @property
     def clears_at(self) -> float:
-        """Time at which to send RPM 0/0 after a Stop. It is infinity if RPM 0/0 is not needed."""
+        """Time in s at which to send RPM 0/0 after a Stop; infinity if RPM 0/0 is not needed."""
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
@@ -138,10 +138,9 @@ class SetPoints:
 
     @property
     def kinematics(self) -> DifferentialKinematics:
-        """Kinematics of the robot.
+        """Kinematics of the robot. Left and right mean the left and right side of the robot.
 
-        Left and right mean the robot's sides. If the board is inverted, its sides are the other way
-        round.
+        If the board is inverted, the board's left side is the robot's right side.
         """
         settings = self.settings
         return DifferentialKinematics(

@@ -19,8 +19,8 @@ from omnibot_driver.core.readings import DisplacementReading
 WAG_S, WAG_UNITS = 0.2, 2
 """A small turn that the driver makes in a drive if the reported heading is constant.
 
-A working IMU shows this turn. Without the turn, a straight drive and a dead IMU would look the
-same.
+The turn is a test of the IMU, because a working IMU reports the turn. Without the turn, a straight
+drive and a dead IMU would look the same.
 
 ``WAG_S``: time in s for which the heading is constant before the driver makes this turn.
 
@@ -72,11 +72,11 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Pass the expected ratio of wheel speeds (left / right) to the odometry.
+        """Pass the expected ratio of wheel speeds (left / right) to the odometry, or None.
 
-        The ratio is needed in two cases: in a turn on the spot, and in a backward drive (B) whose
-        heading the server does not report. The odometry then computes the turn from the ratio. In
-        all other cases, the ratio is None.
+        The odometry computes the robot's turn from this ratio in two cases: in a turn on the spot,
+        and in a backward drive (B) whose heading the server does not report. In all other cases,
+        the ratio is None.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
@@ -90,9 +90,10 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty to the odometry: the left wheel may have turned unseen for ``seconds``.
+        """Add uncertainty to the odometry, because the left wheel may have turned for ``seconds``.
 
-        The left wheel has no encoder, and the right wheel may be stuck.
+        The driver cannot see such a turn: the left wheel has no encoder, and the right wheel may be
+        stuck.
         """
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
@@ -102,8 +103,8 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Record that the present motor units are too small to turn the motors.
 
-        If the robot has already moved in this motion, nothing is recorded: the units were
-        sufficient, and an obstacle blocks the robot.
+        If the robot has already moved in this motion, the units were sufficient, and an obstacle
+        blocks the robot. Then nothing is recorded.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.turn.spun_rad) * self._settings.track_m / 2

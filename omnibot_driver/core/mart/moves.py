@@ -22,10 +22,10 @@ from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
 UNLIKELY: Final = 1 / 3
-"""Assumed error of a move in the odometry, if a second run of the move is possible, but improbable.
+"""Assumed error of the odometry if the server may have run a move twice, but probably has not.
 
 It is a standard deviation, as a fraction of the move. If the second run has really happened, the
-error is the whole move, which is three standard deviations.
+error is the whole move. This is three standard deviations.
 """
 RAN_TWICE: Final = (
     "the network has delivered a controlled move twice, and the driver has stopped the second run"
@@ -42,9 +42,10 @@ WRONG_WAY: Final = (
 )
 DISCARDED: Final = "; the goal of cmd_pose is discarded: remove the cause, then send the goal again"
 OFF_COURSE_RAD: Final = 0.5
-"""Assumed standard deviation, in rad, of the robot's turn in a failed move.
+"""Assumed standard deviation, in rad, of the angle by which the robot turns in a failed move.
 
-If one wheel does not turn, the move fails and the robot turns. The server reports only the failure.
+A move fails if one wheel does not turn. The robot then turns. The server reports only the failure,
+and not the angle.
 """
 LEAST_STOP_S: Final = 0.3
 """Shortest time in s that the server needs to stop a controlled move after SL or SS.
@@ -126,8 +127,9 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn on a good network, the driver first downloads the server's record of the turn.
-        It then learns from the record, which is more exact than the wheel's measurement.
+        After a turn on a good network, the driver can first download the server's record of the
+        turn. It then learns from this record, because the record is more exact than the wheel's
+        measurement.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -212,16 +214,17 @@ class Moves(Asking):
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
         """Return whether the driver may have stopped a second run of a controlled move.
 
-        The result is False if the driver has sent no stop after the move. It is also False if the
-        move was complete and the server answered again very soon. A second run would have delayed
-        this answer more, whether a stop ended it or it ended by itself.
+        The result is False in two cases. In the first case, the driver has sent no stop after the
+        move. In the second case, the move was complete, and the server answered again very soon: it
+        cannot have run the move a second time, because a second run would have delayed the answer
+        more. The delay does not depend on whether a stop ends the second run.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
         return done.stopped_again and not (done.completed and no_time)
 
     def _stop_contradicted(self, done: Done) -> None:
-        """Discard the goal, because right wheel and server disagree on the angle of a turn."""
+        """Discard the goal, because right wheel and server show different angles of a turn."""
         self.odometry.doubt_turn(done.asked - abs(done.turned_rad))
         if self._move is not None:
             self._move.fail()
@@ -229,7 +232,7 @@ class Moves(Asking):
         self._notice(CONTRADICTED.format(asked_deg, seen_deg) + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
-        """Discard the goal, because the network may have duplicated the last move towards it."""
+        """Discard the goal, because the network may have delivered the last move to it twice."""
         if self._move is None or self._move.given_up:
             return
         self._move.fail()

@@ -36,8 +36,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of a controlled move that is in progress, or that the server
-        may run twice. None if there is no such move.
+        ``blind_since_s``: start time of the current controlled move. It is also given after the
+        move, as long as the server may run this move a second time. At all other times, it is None.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

@@ -3,9 +3,11 @@
 """The commands that switch off a motor that is on although the server knows of no motion.
 
 The public server may leave a motor on after a straight move (TF or TB). A server that was restarted
-in a motion may have left both motors on. No stop command switches them off. MCS writes the speeds
-of both motors, and the server then refuses all motions until MSM. This module knows commands and
-replies; it does not know when the robot is at rest.
+in a motion may have left both motors on. No stop command switches them off. So the driver sends
+MCS, which writes the speeds of both motors. After MCS, the server refuses all motions until it gets
+MSM.
+
+This module knows commands and replies; it does not know when the robot is at rest.
 """
 
 from typing import Final
@@ -91,8 +93,8 @@ class SwitchOff:
         After MOST_MISSES unanswered requests in a row, the driver allows motions again. If the last
         of these requests was MCS, the driver also stops using MCS until the next connection.
 
-        The server may still execute an earlier MCS, and then refuses the next motion. In this case,
-        the driver sends MSM, which ends the direct control by MCS.
+        The server may still execute an unanswered MCS later. It then refuses the next motion. The
+        driver therefore sends MSM, which ends the direct control by MCS.
         """
         self._misses += 1
         if self._misses < MOST_MISSES:

@@ -1,17 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of a turn on the spot: as the wheel measures it, and as the server reports it.
+"""The angle of a turn on the spot: the wheel measures it, and the server reports it.
 
-The server's angle comes from the gyro and is preferred. This module knows angles in rad; it does
-not know the pose.
+The server's angle comes from the gyro, and is preferred to the wheel's. This module knows angles in
+rad; it does not know the pose.
 """
 
 from typing import Final
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest accepted difference between a reported turn and the turn that the wheel measured.
+"""Largest accepted difference between the reported turn and the turn that the wheel measured.
 
-It is TOLD_RAD (rad), plus TOLD_PART times the measured turn.
+The difference may be TOLD_RAD (rad), plus TOLD_PART times the turn that the wheel measured.
 """
 NO_CORRECTION: Final = 0.0
 
@@ -21,8 +21,8 @@ class TurnAngle:
 
     Some methods return a correction in rad, which the caller adds to the heading of the pose.
 
-    ``spun_rad``: the turn that the wheel has measured. If ``record`` has accepted an angle, it is
-    this angle instead.
+    ``spun_rad``: the turn that the wheel has measured. When ``record`` accepts an angle, the
+    accepted angle replaces the measured turn.
     """
 
     def __init__(self) -> None:
@@ -41,8 +41,8 @@ class TurnAngle:
     def add(self, turn_rad: float) -> float:
         """Add a turn measured at the wheel; return the angle that the caller adds to the heading.
 
-        The result is zero if the server has already reported the angle of the whole turn: the
-        heading then contains the reported angle.
+        If the server has already reported the angle of the whole turn, the heading already contains
+        this angle. The result is then zero.
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0
@@ -58,7 +58,8 @@ class TurnAngle:
     def end(self, *, may_be_recorded: bool) -> float:
         """End the turn after its last encoder count; return the correction of the heading.
 
-        If the server has reported an implausible angle, the wheel's measurement replaces it.
+        A correction is necessary only if the server has reported an implausible angle. The wheel's
+        measurement then replaces the reported angle.
 
         ``may_be_recorded``: whether the server may have recorded the turn.
         """
@@ -72,10 +73,10 @@ class TurnAngle:
         return wrong_rad
 
     def record(self, told_rad: float) -> float | None:
-        """Process the recorded angle of a turn that has ended; return the heading's correction.
+        """Process the angle in the record of an ended turn; return the heading's correction.
 
-        Return None if the angle is implausible, or if the turn is not the last motion in the
-        current odometry frame.
+        Return None in two cases: the recorded angle is implausible, or the turn is not the last
+        motion in the current odometry frame.
         """
         wrong_rad = told_rad - self.spun_rad
         if not self._may_be_recorded or is_of_another(wrong_rad, self.spun_rad):
@@ -88,9 +89,9 @@ class TurnAngle:
 def is_of_another(wrong_rad: float, spun_rad: float) -> bool:
     """Return whether a reported angle must be the angle of another motion.
 
-    This is so if the angle differs too much from the measured turn.
+    This is the case if the reported angle differs too much from the turn that the wheel measured.
 
-    ``spun_rad``: the turn that the wheel measured. ``wrong_rad``: difference between this turn and
-    the reported angle.
+    ``spun_rad``: the turn that the wheel measured. ``wrong_rad``: difference between ``spun_rad``
+    and the reported angle.
     """
     return abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(spun_rad)

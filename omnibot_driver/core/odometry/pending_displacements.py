@@ -41,12 +41,16 @@ class PendingDisplacements:
 
     @property
     def lost(self) -> int:
-        """Number of displacements that were lost before the first displacement kept here."""
+        """Number of displacements lost directly before the first displacement that waits here."""
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property
     def lost_s(self) -> float:
-        """Duration in s of the displacements that ``lost`` counts."""
+        """Estimated duration in s of all displacements that ``lost`` counts.
+
+        Each of them counts with the duration of the first displacement that waits here. If this
+        duration is unknown, it counts as 0.
+        """
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property
@@ -55,9 +59,9 @@ class PendingDisplacements:
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Return the time in s without a report before the first displacement that is kept here.
+        """Return the time in s without a report before the first displacement that waits here.
 
-        ``last_stamp_s``: stamp of the last report before this time. It is used only if the
+        ``last_stamp_s``: stamp of the last report before this displacement. It is used only if the
         displacement has no duration.
         """
         if not self._waiting:
@@ -68,9 +72,10 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Return the duration of the gap in s, computed from stamps, but at most ``unheard_s()``.
+        """Return the duration in s of the gap before the first waiting displacement, by the stamps.
 
-        The gap lasts from ``last_stamp_s`` to the beginning of the first waiting displacement.
+        The gap begins at ``last_stamp_s``, and ends where this displacement begins. The result is
+        at most ``unheard_s()``.
         """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:
@@ -81,9 +86,9 @@ class PendingDisplacements:
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
     def before(self, board: Pose) -> Pose:
-        """Return the pose before all displacements kept here.
+        """Return the pose before all displacements that wait here.
 
-        ``board``: the pose after them.
+        ``board``: the pose after all these displacements.
         """
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)

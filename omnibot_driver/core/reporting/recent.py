@@ -14,7 +14,10 @@ RECENT_S: Final = 10.0
 
 
 class RecentFigures:
-    """The session's figures of the last 10 s, or since the last change of the session's state."""
+    """The session's figures of the last 10 s.
+
+    If the session's state has changed in this time, there are only the figures since this change.
+    """
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
@@ -30,7 +33,10 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Store ``count`` as the counter ``name``; return whether it has grown in the last 10 s."""
+        """Store ``count`` as the latest value of the counter ``name``.
+
+        Return whether this counter has grown in the last 10 s.
+        """
         before, at = self._counts.get(name, (count, -math.inf))
         if count > before:
             at = now
@@ -38,7 +44,7 @@ class RecentFigures:
         return now - at < RECENT_S
 
     def waiting_share(self, link: LinkFigures, now: float) -> float:
-        """Return the share of recent time, 0 to 1, in which the reader waited for the processor."""
+        """Return the share of the last 10 s, 0 to 1, in which the reader waited for a processor."""
         if link.waited_s is None:
             return 0.0
         self._waits.append((now, link.waited_s))
@@ -53,7 +59,10 @@ class RecentFigures:
         return self._window[-1][0] - self._window[0][0]
 
     def rates_hz(self) -> dict[RateName, float] | None:
-        """Return the recent rate of each kind of reading in Hz; None after a change of state."""
+        """Return the recent rate of each kind of reading in Hz.
+
+        The result is None directly after a change of the session's state.
+        """
         if not self.span_s:
             return None
         old, new = self._window[0][1].tally, self._window[-1][1].tally

@@ -54,8 +54,8 @@ class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each encoder tick, from the latest RPMs.
 
     ``stands``: whether the position does not change while both RPMs are equal.
-    ``divides``: whether the velocity is NaN or infinite after two ticks at the same time, because
-    the firmware divides by zero.
+    ``divides``: whether the velocity is NaN or infinite if two ticks have the same time. The reason
+    is that the firmware then divides by zero.
     ``slow``: whether each count of the timer takes 0.7 % too long.
     """
 

@@ -2,8 +2,8 @@
 
 """The protocol as the board encodes and decodes it, from the manual and the public firmware.
 
-A line is ``:``, 2 hexadecimal digits of command, 8 of payload, 2 of checksum, and a line feed. The
-checksum is the XOR of all characters before it.
+A line has a ``:``, the command as 2 hexadecimal digits, the payload as 8 digits, the checksum as 2
+digits, and a line feed. The checksum is the XOR of all characters that precede the checksum.
 
 This module shares no code with the driver. It does not know what a command means.
 """

@@ -236,7 +236,10 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """Set the front clearance in inches (TFSFC). A nearer wall stops the next move forward (TF)."""
+    """Set the front clearance in inches (TFSFC).
+
+    A wall that is nearer than the clearance stops the next forward move (TF).
+    """
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 

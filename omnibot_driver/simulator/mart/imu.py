@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The IMU: its gyro, whether it works, and the heading that the server computes from it.
+"""The IMU: its gyro, whether the IMU works, and the heading that the server computes.
 
-This module knows turn rates and times; it does not know motions or commands.
+The server computes the heading from the gyro. This module knows turn rates and times; it does not
+know motions or commands.
 """
 
 from omnibot_driver.simulator.mart.settings import MartSettings
@@ -11,10 +12,11 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    alive: whether the IMU is plugged in; the caller can set it. The settings can plan failures too.
-    closed: whether the server has stopped using the IMU, until RST IMU or SB succeeds.
-    rate_dps: turn rate of the last sample, minus the bias that the server knows.
-    heading_deg: the relative heading, left positive.
+    alive: whether the IMU is plugged in. The caller can set it. The settings can also plan a
+    failure.
+    closed: whether the server has stopped using the IMU. A successful RST IMU or SB ends this.
+    rate_dps: turn rate of the last sample in degrees/s, minus the bias that the server knows.
+    heading_deg: the relative heading in degrees, positive to the left.
     """
 
     def __init__(self, settings: MartSettings) -> None:

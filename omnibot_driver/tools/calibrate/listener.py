@@ -43,7 +43,8 @@ LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCA
 class Listener(Client):
     """A client that records the robot's data in ``log``.
 
-    ``log`` has only the data of the current motion, or of the current recording without commands.
+    ``log`` begins anew with each motion, and with each recording during which the robot gets no
+    commands.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -128,7 +129,8 @@ class Listener(Client):
     def _begin(self, states: Sequence[str]) -> None:
         """Wait for fresh data, then begin a new log.
 
-        The last data may be old, because the tool receives nothing while it waits for the user.
+        Data from before this call may be old, because the tool receives nothing while it waits for
+        the user.
         """
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
@@ -174,7 +176,7 @@ class Listener(Client):
         return silent(self._heard_s, wanted, time.monotonic())
 
     def _hear_pending(self) -> None:
-        """Read the messages that have already arrived. Some may wait if this program was late."""
+        """Read the messages that have already arrived, but that this program has not read yet."""
         for _ in range(AT_ONCE):
             self._executor.spin_once(timeout_sec=0.0)
 

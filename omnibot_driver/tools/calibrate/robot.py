@@ -34,9 +34,9 @@ PERIOD_S: Final = 0.02
 """Period, in s, with which the tool sends commands."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""Time, in s, that the tool waits from the request for a record to the start of the motion.
+"""Time, in s, from the tool's request for a record to the start of the motion.
 
-In this time the driver can repeat a lost request.
+The tool waits for this time, so that the driver can repeat a lost request.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
@@ -56,10 +56,10 @@ class Robot(Listener):
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """For each topic and command: how many of this node's messages have not come back yet.
+        """For each topic and command: number of this node's messages that have not come back yet.
 
-        This node subscribes to its own topics. A negative number shows that another node has
-        published this command.
+        This node subscribes to its own topics, so its messages come back. A negative number shows
+        that another node has published this command.
         """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
@@ -103,14 +103,14 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot as ``law`` commands, within ``bounds``; then stop it. Return the log.
+        """Move the robot by the control law ``law``, within ``bounds``; then stop it. Return a log.
 
         ``obeys``: whether to raise an error if the robot does not move.
 
         ``monitored``: whether the driver's motion monitor stays on. It must be off until speed and
         direction are calibrated.
 
-        ``show``: called with the seconds since the start.
+        ``show``: function that is called with the seconds since the start of the motion.
 
         Raises ToolError on an e-stop, lost data, another node's command, a motion beyond the
         bounds, no motion, a robot that does not come to rest, or clocks that differ.

@@ -27,9 +27,9 @@ LEAST_SIGMA: Final = 1e-4
 """Lower limit of two estimated standard deviations: that of a pose, in m or rad, and that of the
 gyro's mean rate, in rad/s."""
 CORRECTED_WITH: Final = 5
-"""Number of successive odometry steps that are regarded as one independent measurement.
+"""Number of successive odometry steps over which the driver spreads a correction of the pose.
 
-The driver spreads a correction of the pose over this number of steps.
+The tool regards this number of steps as one independent measurement.
 """
 
 
@@ -87,7 +87,7 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Return the measured speed for each command in the log that lasted long enough.
+    """Return one measured speed for each command in the log that stayed the same for long enough.
 
     ``scales``: counts per m/s or rad/s, for x, y and yaw.
 
@@ -171,7 +171,8 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 def _way(pose: Column, axis: int) -> Column:
     """Return the coordinate of each pose along one axis of the robot.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. The direction of x and y is that of the mean heading.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. The axes x and y have the direction that they have at the
+    mean heading of all these poses.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

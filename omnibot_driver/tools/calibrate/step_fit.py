@@ -34,7 +34,7 @@ BEFORE: Final = 3
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
-"""Shifts of an onset that the tool tries, in ticks. A positive shift is to an earlier time."""
+"""Shifts of an onset that the tool tries, in ticks. A positive shift makes the onset earlier."""
 UNLIKE: Final = 3.0
 """A step is rejected if its misfit exceeds the median misfit of all steps by this factor."""
 
@@ -73,8 +73,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: the model's response to a unit step. Its argument is the end of each delta, in
-        ticks after the unit step. It returns the mean rate in each delta.
+        ``mean``: function for the model's response to a unit step. Its argument is the end of each
+        delta, in ticks after the unit step. It returns the mean rate in each delta.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -116,7 +116,7 @@ class Fit:
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
-        """Return the model's prediction of a step's odometry deltas, in rad/s."""
+        """Return the mean rate in rad/s that the fit predicts for each odometry delta of a step."""
         told = step.told_by(lambda ticks: self.model.mean(self.values[1:], ticks * TICK_S))
         return np.asarray(self.values[0] * told)
 
@@ -220,9 +220,10 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The better of the fits of first and second order, by Akaike's information criterion.
+        """The better one of two fits: the fit of first order, and the fit of second order.
 
-        These two models assume nothing about the control loop.
+        Akaike's information criterion decides which fit is better. Neither model assumes anything
+        about the control loop.
         """
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
@@ -246,7 +247,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps with corrected onsets: with these, the steps fit the model best.
+    """Return the steps with corrected onsets. The corrected steps fit the model best.
 
     An onset is computed from the time of a command. If a busy computer delayed the command, the
     true onset is later.

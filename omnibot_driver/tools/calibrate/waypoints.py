@@ -73,7 +73,7 @@ def turn(angle_rad: float, turning: float) -> Law:
 
 
 def square(side_m: float, sign: int) -> list[Pose]:
-    """Return the eight poses at the ends of a square's four sides and four quarter turns.
+    """Return the eight poses on a square drive: after each side, and after each quarter turn.
 
     ``sign``: 1 for turns to the left, -1 for turns to the right.
     """

@@ -16,11 +16,11 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s from the beginning of the last state in the log. A driver that still runs reports this
-state in /diagnostics even later.
+"""Time in s after which /diagnostics still shows the last state in the log, if the driver runs.
 
-If the last state is "disconnected", the driver has ended, or it has lost its board and still runs.
-If /diagnostics does not show the state after this time, the driver has ended.
+The time is counted from the beginning of this state. The last state "disconnected" has two possible
+reasons: the driver has ended, or it has lost its board and still runs. If /diagnostics does not
+show the state after this time, the driver has ended.
 """
 
 
@@ -80,9 +80,10 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Return whether the driver still ran in ``state``, the last state in the log.
+    """Return whether the driver was still running in ``state``, the last state in the log.
 
-    It still ran if /diagnostics shows the state more than 2 s (``SILENT_S``) after it began.
+    It was running if /diagnostics shows this state more than 2 s (``SILENT_S``) after the state
+    began.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

@@ -39,11 +39,12 @@ messages are regarded as missing.
 class Stream:
     """The expected timing of a topic.
 
-    ``running``: the driver's states in which it publishes the topic.
+    ``running``: the states of the driver in which the driver publishes the topic.
 
-    ``lost``: keys of the counts of lost messages in the driver's diagnostics.
+    ``lost``: the counts of lost messages, as keys of the driver's diagnostics.
 
-    ``rates``: keys of the rate in the diagnostics; the first with a value is used.
+    ``rates``: the rate of the topic, as keys of the driver's diagnostics. The first key that has a
+    value is used.
     """
 
     name: str
@@ -91,10 +92,12 @@ If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 class FrameSchedule:
     """The measured timing of a topic.
 
-    ``at_s``: the timestamp before each step from one message to the next.
+    A step is the time from one message's timestamp to the timestamp of the next message.
+
+    ``at_s``: the timestamp at which each step begins.
     ``steps_s``: length of each step. ``period_s``: the median step.
     ``gap_at_s``, ``gap_s``: start and length of each gap that the driver's state does not explain.
-    ``missing``: how many messages are missing in each gap.
+    ``missing``: number of missing messages in each of these gaps.
     ``leap_at_s``, ``leap_s``: start and length of each long step that short steps compensate.
     ``arrived_s``: time of arrival of each message.
     ``late_s``: time from the timestamp of each message to its arrival.
@@ -165,9 +168,9 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the index at which its range ends.
 
-    Within the range, short steps can compensate the long step. The range begins at the long step.
-    It has ``most`` steps, or fewer if another long step comes earlier. The returned index is that
-    of the first step after the range.
+    The range of a long step is the range in which short steps can compensate it. It begins at the
+    long step, and has ``most`` steps. If another long step comes earlier, the range ends there. The
+    returned index is that of the first step after the range.
 
     ``wide``: indices of the long steps.
     """

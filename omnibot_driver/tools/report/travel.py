@@ -15,10 +15,12 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad of the difference between two motions: the change
-of the pose from one message to the next, and the motion that the twist shows. A change that exceeds
-a limit is a leap. The driver's own corrections of odom do not exceed them, because
-fastest_linear_speed limits these corrections."""
+"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad. A step of the pose that exceeds one is a leap.
+
+They limit the difference between two motions in the step from one message to the next: the change
+of the pose, and the motion that the twist shows. The driver's own corrections of odom do not exceed
+the limits, because fastest_linear_speed limits these corrections.
+"""
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1

@@ -24,7 +24,7 @@ def bench() -> Bench:
 
 
 def unpause(bench: Bench) -> None:
-    """Pause the board and resume it before the driver notices, as another program might do."""
+    """Pause the board, then resume it before the driver notices, as another program might do."""
     bench.board.receive(b"P")
     bench.run(0.02)
     bench.board.receive(b"P")
@@ -85,9 +85,10 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The board restarts while the robot drives. The driver sends no motion frame after the boot.
+    """The board restarts while the robot drives. After the boot, the driver sends no motion frame.
 
-    The board, paused after its boot, could read a byte of such a frame as the letter S (start).
+    A board is paused after its boot. It could read a byte of a motion frame as the letter S
+    (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
@@ -105,7 +106,8 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
     """After a request for a pause or a reset, the driver sends no motion frame.
 
-    This is so even if the board does not receive the request, and the robot drives on.
+    It sends no motion frame even if the request does not reach the board, and the robot therefore
+    drives on.
     """
     bench.drive(0.4)
     start = len(bench.written)

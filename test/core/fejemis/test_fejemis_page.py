@@ -194,7 +194,7 @@ def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
 def said_by_the_driver() -> set[str]:
     """Return all lines that the driver sends in a session in which a user requests everything.
 
-    The example lines of a relayed angle and of a lift voltage are added to the result.
+    The result also contains two example lines: one of a relayed angle, and one of a lift voltage.
     """
     written: dict[Written, tuple[float, ...]] = {
         Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
@@ -228,11 +228,11 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """A user requests everything that the driver offers.
+    """A user requests everything that the driver offers. The driver then sends commands.
 
-    The driver then sends each command exactly as in the table's example line; only for ``motv``,
-    the numbers may differ. It never sends the commands that the table marks as unused or replaced.
-    An unused one is ``setid``, which can erase the board.
+    It sends each command exactly as in the table's example line. Only the numbers of ``motv`` may
+    differ. The driver never sends the commands that the table marks as unused or replaced. One of
+    the unused commands is ``setid``, which can erase the board.
     """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden

@@ -17,7 +17,7 @@ from omnibot_driver.core.requests import Request, RequestDone
 
 @pytest.fixture
 def bench() -> Bench:
-    """Return a bench whose drive board has been commanded to cut the power in 99 s."""
+    """Return a bench whose drive board has received the command to cut the power after 99 s."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -53,10 +53,12 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 @pytest.mark.parametrize("closes", [False, True])
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
-    """During a power off, the boards fall silent. Then the user calls ~/start.
+    """The boards fall silent during a power off. Then the user calls ~/start.
 
-    The call ends the power off, which is reported as failed. The boards have sent nothing since the
-    call, so ~/start is not confirmed. ``closes``: whether the ports close right after the call.
+    This call ends the power off, and the driver reports the power off as failed. The boards have
+    sent nothing since the call, so the driver does not confirm ~/start.
+
+    ``closes``: whether the ports close right after the call.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -93,7 +95,8 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
     """The user calls ~/start, and then ~/power_off.
 
-    The driver stops repeating the ``on`` of ~/start, because ``on`` would cancel the power off.
+    The driver repeats the line ``on`` after ~/start. This line would cancel the power off, so the
+    driver stops repeating it when the user calls ~/power_off.
     """
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -138,7 +141,7 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 ) -> None:
     """The drive board restarts between two connections, so it has forgotten the power off.
 
-    The driver notices the restart by the board's clock, and accepts motion.
+    The board's clock shows the restart to the driver. So the driver accepts motion again.
     """
     bench.run(1.5)
     bench.close()
@@ -157,10 +160,10 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_other_order(
     bench: Bench,
 ) -> None:
-    """Both boards restart while not connected, and come back at each other's port.
+    """Both boards restart while not connected. Afterwards, each board is at the other board's port.
 
-    The driver compares the time of each board with the earlier time of the same board. The port
-    does not matter. So the driver notices both restarts, and accepts motion.
+    The driver compares the time of each board with the earlier time of the same board, at whatever
+    port it is. So the driver notices both restarts, and accepts motion.
     """
     bench.close()
     bench.speaks = set()
@@ -277,8 +280,9 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """If the command ``off 300`` loses its 3 and a 0, its checksum still fits.
+    """If the command ``off 300`` loses its 3 and one 0, its checksum still fits.
 
-    So the driver sends a longer delay that has no such pair of digits.
+    The robot would then wait less than the user wants. So the driver sends a longer delay, in which
+    the checksum detects the loss of any two digits.
     """
     assert whole_seconds(wanted_s) == seconds

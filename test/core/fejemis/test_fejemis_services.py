@@ -18,9 +18,9 @@ from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 
 
 def test_the_gyro_is_calibrated_by_the_board() -> None:
-    """The board calibrates its gyro.
+    """The board calibrates its gyro at the user's request.
 
-    The request succeeds when the board reports another gyro offset.
+    The request succeeds when the board reports a gyro offset that differs from the earlier one.
     """
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     done = ask(bench, Job.CALIBRATE_GYRO)
@@ -32,9 +32,9 @@ def test_the_gyro_is_calibrated_by_the_board() -> None:
 
 
 def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
-    """The driver needs two equal readings of new offsets before it reports success.
+    """The driver reports success only after it has read the same new offsets twice.
 
-    A single reading may be a damaged answer that passes its checksum.
+    A single reading may come from a damaged answer whose checksum fits by chance.
     """
     jobs = Jobs()
     jobs.ask(Job.CALIBRATE_GYRO, None, 0.0)
@@ -76,9 +76,10 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """Every command to calibrate is lost, so the offsets stay unchanged. The request fails.
+    """Every command to calibrate is lost, so the offsets stay unchanged. The user's request fails.
 
-    A real calibration always changes the offsets a little, because of sensor noise.
+    The driver can rely on the offsets, because a real calibration always changes them a little: the
+    sensor has noise.
     """
     bench = nominal()
     lose(bench, word.encode(), 99)
@@ -91,9 +92,9 @@ def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("channel", [DRIVE, FRONT])
 def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -> None:
-    """One board receives nothing, but sends its data. A request to load a configuration fails.
+    """One board receives nothing, but still sends its data.
 
-    The request is answered within 5 s.
+    The user's request to load a configuration fails. The driver answers the request within 5 s.
     """
     bench = nominal()
     bench.run(1.5)
@@ -299,7 +300,8 @@ def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None
 def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
     """Both boards load their saved values (``eer``), and one of them restarts meanwhile.
 
-    Both have lost the user's settings, so the driver writes them to both again.
+    Afterwards, neither board has the user's settings. So the driver writes the settings to both
+    boards again.
     """
     wheels = (0.08, 0.08, 9.7, 48.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: wheels}))
@@ -332,11 +334,12 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
-    """The user requests to load the configuration. The driver shuts down while the robot brakes.
+    """The driver shuts down during a job: it was going to load the configuration.
 
-    The request fails, and the answer names the shutdown as the reason. Before, the user had changed
-    a setting, which is not written to the boards yet. The driver does not write it during the
-    shutdown. It only sends commands to stop, and the angles of the front wheel.
+    The robot still brakes for this job. The job fails, and its answer names the shutdown as the
+    reason. Before the job, the user changed a setting, but the driver has not written it to the
+    boards yet. During the shutdown, the driver does not write this setting. It only sends commands
+    to stop, and the angles of the front wheel.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

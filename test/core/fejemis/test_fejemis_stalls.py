@@ -56,11 +56,11 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
     ],
 )
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
-    """The robot drives a curve while the driver stalls. The odometry has all of this motion.
+    """The robot drives a curve while the driver stalls. The odometry contains this whole motion.
 
-    No line of the boards is lost. If the driver does not notice the stall, it rejects lines that
-    are more than 1 s late. In this case, the first displacement after the stall covers seconds, and
-    the next one 20 ms. The driver regards neither of them as implausible.
+    No line of the boards is lost. But if the driver does not notice the stall, it rejects lines
+    that are more than 1 s late. The first displacement after the stall then covers seconds, and the
+    second one covers 20 ms. The driver regards neither of these two displacements as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -80,8 +80,9 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
     """The driver stalls, and the boards' lines wait in the terminal's buffer.
 
-    The buffer has room for the lines of 0.37 s, or for all lines. All samples in it are published
-    later, with the times at which the board took them.
+    In one case, the buffer has room for the lines of 0.37 s only; in the other case, it has room
+    for all lines. Later, the driver publishes all samples that are in the buffer. Each sample has
+    the time at which the board took it.
     """
     bench = nominal()
     bench.run(1.0)

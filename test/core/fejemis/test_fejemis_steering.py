@@ -100,7 +100,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The front wheel has not reached its angle. The body is not faster than commanded.
+    """The body is not faster than commanded while the front wheel has not reached its angle.
 
     A small excess is allowed: the effect of an error of 5° in the wheel's angle.
     """
@@ -255,9 +255,9 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
     """The motion monitor has stopped the robot twice, so the driver refuses motion commands.
 
-    A node repeats the command -0.3 m/s. While ``allow_reverse`` is off, the driver reduces the
-    speed to zero. It accepts this, because it is not a motion. Then the user sets
-    ``allow_reverse``. The robot stays at rest, and the driver refuses the node's next command.
+    A node repeats the command -0.3 m/s. While ``allow_reverse`` is off, the driver reduces it to
+    zero, and accepts the zero, because it is not a motion. Then the user sets ``allow_reverse``.
+    The robot stays at rest, and the driver refuses the node's next command.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

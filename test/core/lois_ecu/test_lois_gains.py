@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Controller gains: how they reach the board, and the notice about those that are not set."""
+"""Tests of controller gains: how they reach the board, and the notice about missing gains."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def told(bench: AnyBench) -> list[str]:
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """The user has set no gains. One notice reports that the board uses its own gains.
+    """The user has set no gains, so the board uses its own. One notice tells the user this.
 
     The diagnostics name the missing gains until the user has set them.
     """

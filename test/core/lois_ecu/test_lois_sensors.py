@@ -66,9 +66,9 @@ def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
 
 
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
-    """Just after midnight, the last date from the board is that of the day before.
+    """Just after midnight, the last date that the board has sent is that of the day before.
 
-    The time is unknown until a new date arrives.
+    The driver regards the time as unknown until a new date arrives.
     """
     ecu = LoisConversation(LoisEcuSettings())
     said = [GpsDate(26, 11, 22), GpsTime(23, 59, 59), GpsTime(0, 0, 1), GpsDate(26, 11, 23)]
@@ -111,11 +111,11 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """The odometry is reset at a compass heading of 120°. Later headings of 120° are accepted.
+    """The odometry is reset while the compass shows 120°. Later headings of 120° are accepted.
 
-    While the robot faces north, the board may falsely report 120°, so the driver then rejects 120°.
-    This robot does not face north. The reset sets its yaw to zero, but the driver still knows which
-    heading to expect.
+    A board that faces north may falsely report 120°, so the driver rejects 120° while it expects a
+    heading near north. This robot does not face north. The reset sets its yaw to zero, but the
+    driver still knows which heading to expect.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

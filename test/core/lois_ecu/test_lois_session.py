@@ -47,7 +47,8 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
     """The user presses and releases the e-stop button while the board sends a record.
 
-    The board reports only the release. The button was pressed, so the driver latches the e-stop.
+    The board reports only the release. A release proves that the button was pressed, so the driver
+    latches the e-stop.
     """
     bench = Bench(firmware)
     bench.drive_on(0.6, 1.0)
@@ -68,7 +69,7 @@ def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
     """The motion monitor stops the robot, and its notices name parameters of the LOIS ECU.
 
-    The board has no ~/start, so the advice is to latch and release the e-stop.
+    This board has no ~/start. So the notices advise the user to latch and release the e-stop.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
@@ -108,9 +109,10 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """The user resets the board while its tick counters are zero. No report can prove this reset.
+    """The board's tick counters are already zero when the user requests a reset.
 
-    The driver's answer is that the reset is unconfirmed.
+    A reset sets these counters to zero, so no report can prove that the board has obeyed. The
+    driver answers that the reset is unconfirmed.
     """
     bench = Bench(firmware)
     before = len(bench.written)
@@ -124,9 +126,9 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
-    """The first reset is lost, so the tick counters do not change.
+    """The first reset that the driver sends is lost. So the tick counters do not change.
 
-    The driver repeats the reset, and the counters prove it.
+    The driver sends the reset again. Then the tick counters prove that the board has obeyed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, 1.2)
@@ -145,9 +147,9 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_reset_is_not_repeated_after_the_answer_that_it_failed() -> None:
-    """Ticks arrive from the board, but it does not receive a reset, because a wire is broken.
+    """A wire is broken: ticks arrive from the board, but the board does not receive the reset.
 
-    The driver sends the reset up to eight times, and then answers that it failed. After this
+    The driver sends the reset up to eight times, and then answers that the reset failed. After this
     answer, the driver does not send the reset again. When the wire is repaired, a new request
     succeeds.
     """
@@ -226,8 +228,8 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
     """The board loses power while it sends a line of text, so only a part of the line arrives.
 
-    The notice to the user says that no data arrives. It does not say that the baud rate may be
-    wrong.
+    This part must not be taken for a sign of a wrong baud rate. The notice to the user says only
+    that no data arrives.
     """
     bench = Bench("firmware")
     while not bench.board._uart.sending:
@@ -245,8 +247,8 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     """Whenever the board sends a report, it receives nothing for a moment.
 
-    So the driver writes all settings five times, each time in another order. Each setting arrives.
-    In a fixed order, the same setting could be lost every time.
+    In a fixed order, the same setting could be lost every time. So the driver writes all settings
+    five times, each time in another order. Each setting arrives at least once.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -312,10 +314,11 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
 def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_s: float) -> None:
     """The user resets the board while older tick counts are still on their way to the driver.
 
-    After these counts, the driver reads counts of 0. It does not take this decrease for a motion.
-    It also does not conclude that the board counts backward.
+    After these older counts, the driver reads counts of 0. It does not take the decrease to 0 for a
+    motion. It also does not conclude that the board counts backward.
 
-    ``stall_s``: time in s, just before the reset, in which the driver reads nothing.
+    ``stall_s``: length in s of a stall just before the reset. During the stall, the driver reads
+    nothing.
     """
     bench = Bench(firmware, HOST_GAINS)
     board = bench.session.board

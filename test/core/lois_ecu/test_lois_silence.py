@@ -14,9 +14,10 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
-    """Return a bench at rest, after a drive in which the connection was lost for ``seconds``.
+    """Return a bench whose robot is at rest after a drive in which the connection was lost.
 
-    ``reopened``: whether the port was closed and opened again.
+    ``seconds``: how long the connection was lost. ``reopened``: whether the port was closed and
+    opened again.
     """
     bench = nominal(firmware)
     bench.drive_on(vx, 4.0)
@@ -53,9 +54,9 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
-    """The connection is lost, so no Stop arrives, and the robot drives on for metres.
+    """The connection is lost in a drive. So no Stop arrives, and the robot drives on for metres.
 
-    When the connection is back, the error of the position is within 3 sigma.
+    When the connection is back, the error of the estimated position is within 3 sigma.
     """
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m
@@ -70,7 +71,8 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 ) -> None:
     """The connection is lost while the robot drives forward. The board continues to count ticks.
 
-    So the odometry afterwards is right within a tenth of the distance.
+    When the connection is back, these ticks show how far the robot has driven. So the odometry is
+    right within a tenth of the distance.
     """
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)

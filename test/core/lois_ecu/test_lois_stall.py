@@ -33,8 +33,8 @@ def pose(x_m: float) -> BoardOdometry:
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
     """Return the times in s, within six seconds, at which a wheel is reported as stalled.
 
-    ``ticks``: new ticks of both wheels in each 0.2 s. ``ways_m``: distance in m that the board's
-    odometry (0x20) adds in each 0.2 s.
+    ``ticks``: new ticks of the left and the right wheel in each 0.2 s. ``ways_m``: distance in m by
+    which the pose in the board's odometry reports (0x20) moves in each 0.2 s.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -60,9 +60,10 @@ def test_wheels_that_tick_do_not() -> None:
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """A wheel is commanded backward, and the public firmware does not count its ticks.
+    """A wheel is commanded backward. The public firmware does not count the ticks of such a wheel.
 
-    A stall is reported if the reported pose does not change.
+    So only the pose in the board's reports can show that the wheel does not turn. If this pose does
+    not change, the driver reports a stall.
     """
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
@@ -101,26 +102,28 @@ def looks_stalled(
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
     """The left wheel's reported speed never changes while the right wheel ticks.
 
-    The left wheel looks stalled. The firmware's pose changes nevertheless, because it is computed
-    from the old speed.
+    So the left wheel looks stalled. The pose that the firmware reports changes too, but it does not
+    show a motion of the left wheel: the firmware computes it from the old speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
-    """Most reports are lost, and the few others show the same speed for 3 s.
+    """Most reports are lost. For 3 s, all reports that arrive show the same speed of a wheel.
 
-    The wheel may have had other speeds in between, so only more reports show a stall.
+    The wheel may have had other speeds between these reports. So the driver reports no stall until
+    it has more reports.
     """
     assert not looks_stalled([(-10, 8 + step % 3) for step in range(7)], every_s=0.5)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(10)], every_s=0.5)
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """A wheel's reported speed stays above its set-point, so the controller gives no power.
+    """One wheel's reported speed stays the same, above the wheel's set-point.
 
-    The wheel looks stalled, because a rolling wheel would become slower.
+    The speed controller then gives no power, so a rolling wheel would become slower, and its
+    reported speed would fall. The driver therefore regards this wheel as stalled.
     """
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
@@ -129,8 +132,8 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel can roll at a constant speed above its set-point.
 
-    So a constant reported speed does not show that the wheel is at rest. It does so only if the
-    other wheel's speed changes meanwhile.
+    So a constant reported speed alone does not show that the wheel is at rest. It shows this only
+    if the other wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -149,9 +152,9 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """The board reports both wheels at 1.3 times their set-points, so both roll.
+    """The board reports both wheels at 1.3 times their set-points. So both wheels really roll.
 
-    If the board reports only one wheel so fast, this wheel looks stalled: the board may be
+    If the board reports only one wheel at such a speed, this wheel looks stalled: the board may be
     repeating the last speed of a wheel that is at rest.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
@@ -159,10 +162,11 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """The odometry assumes that a wheel rests. Its reported speed is just above its set-point.
+    """The odometry assumes that a wheel is at rest, but the board reports a speed of the wheel.
 
-    The controller uses the reported speed, and gives the motor no power. Without power, a wheel at
-    rest does not start. So the driver regards the wheel as stalled.
+    This speed is just above the wheel's set-point, so the speed controller gives the motor no
+    power. Without power, a wheel at rest does not start. So the driver regards the wheel as
+    stalled.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -204,9 +208,9 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 ) -> None:
     """The right wheel's reported speed stays the same while the left wheel's speed varies.
 
-    So the right wheel may be at rest. But its reported speed is high, so it may also roll. The
-    driver sends RPM 0/0 to start the wheel again. The odometry keeps the distance that the wheel
-    has rolled.
+    So the right wheel may be at rest. It may also roll, because its reported speed is high. The
+    driver sends RPM 0/0 to start the wheel again. If the wheel has rolled, the odometry keeps the
+    distance.
 
     ``right_rpm``: reported speed of the right wheel. Its set-point is −31 RPM. At −68 RPM, the
     controller of the wheel is saturated and keeps full power.
@@ -239,7 +243,8 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
     """After a forward drive, the user commands the robot backward, but the wheels are blocked.
 
-    The odometry does not subtract the forward drive: its pose moves by less than 0.15 m.
+    The odometry does not take back the distance of the forward drive: its pose moves by less than
+    0.15 m.
 
     ``reset``: whether the odometry is reset before the backward command.
     """

@@ -168,7 +168,10 @@ class MartBench(AnyBench):
         self.run_until(holds, limit_s)
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
-        """Command the goal pose. While it is refused, repeat it every 0.1 s, for 5 s at most."""
+        """Command the goal pose.
+
+        If the driver refuses the goal, repeat it every 0.1 s, for 5 s at most.
+        """
         for _ in range(50):
             try:
                 self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
@@ -198,7 +201,7 @@ class MartBench(AnyBench):
     def said(self, since: int = 0) -> list[bytes]:
         """Return the driver's datagrams without its regular queries.
 
-        ``since``: number of the first datagrams to leave out.
+        ``since``: how many datagrams to leave out, counted from the first one.
         """
         return [data for _, data in self.written[since:] if data not in POLLS]
 

@@ -24,9 +24,9 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    A crash of the server is always wrong. If the IMU is dead, or if the driver has given up, this
-    is the only fault. While the driver finds out which motion is in progress, there are two
-    faults: a crash, and a command port that hangs. At other times, there are more.
+    A crash of the server is always a fault. If the IMU is dead, or if the driver has given up, a
+    crash is the only fault. While the driver finds out which motion is in progress, there is a
+    second fault: a command port that hangs. At other times, there are further faults.
     """
     server, driver = world.server, world.driver
     if server.crashed:

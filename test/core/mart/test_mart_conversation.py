@@ -93,9 +93,10 @@ def test_a_reply_answers_the_pending_request() -> None:
     ],
 )
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
-    """A late reply arrives while another request is pending.
+    """A late reply to an earlier request arrives while another request is pending.
 
-    The server never answers the pending command like this, so the driver discards the reply.
+    The server never answers the pending request in this form. So the driver discards the late
+    reply.
     """
     talk = conversation()
     talk.ask(word.request(), 1.0)
@@ -105,9 +106,9 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """An ok comes 0.3 s after a check of the IMU. A check takes at least 0.32 s.
+    """An ok comes 0.3 s after a check of the IMU, but a check takes at least 0.32 s.
 
-    So the ok is a late reply.
+    So this ok is a late reply to an earlier request. It does not prove that the IMU works.
     """
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
@@ -117,9 +118,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """RST IMU checks the IMU. A late ok to an earlier command could be taken for this check's.
+    """RST IMU checks the IMU. A late ok to an earlier command could be taken for its reply.
 
-    So the driver sends RST IMU later: any late ok then arrives before RST IMU can be answered.
+    So the driver waits before it sends RST IMU: any late ok then arrives before RST IMU can be
+    answered.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -134,10 +136,10 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """The reply to a sonar query has not come in time, but may still come.
+    """The reply to a sonar query has not come in time, but it may still come late.
 
-    So the driver delays the next sonar query. It sends the encoder query (ENC) at once, but regards
-    the reply to this query as doubtful.
+    The late reply could be taken for the reply to a later query. So the driver delays the next
+    sonar query. It sends the encoder query (ENC) at once, but regards the reply as doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -195,7 +197,8 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
     """The driver sends a stop 0.1 s after a start. The stop may overtake the start.
 
-    Only the reply to a later stop proves rest.
+    So the reply to this stop does not prove that the robot is at rest. Only the reply to a later
+    stop proves this.
     """
     stop = stopping(Motion.REFERENCE, started_s=9.9)
     assert stop.due(10.0) == (words.SRM,)
@@ -205,9 +208,10 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """After a start and a stop, two ``ok`` arrive. They may be two copies of the start's reply.
+    """After a start and a stop, two ``ok`` arrive.
 
-    So they do not prove the stop. A later "no motion" proves it.
+    Both may answer the start, because the network may have copied the reply to the start. So they
+    do not prove the stop. A later "no motion" proves it.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -219,9 +223,9 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
     """The driver sends a start, then a stop, then a second stop.
 
-    The first stop may arrive before the start, so the reply to the first stop proves nothing. The
-    network may duplicate this reply: for 0.6 s after the first stop, any reply may be a copy of it.
-    Only a reply after this time proves a stop.
+    The first stop may arrive before the start, so the reply to the first stop proves nothing. For
+    0.6 s after the first stop, any reply may be a copy of this worthless reply. Only a reply after
+    this time proves a stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -232,7 +236,10 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
 
 
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
-    """After three unanswered stops the driver uses the stop port, and then ignores replies."""
+    """After three unanswered stops, the driver uses the stop port.
+
+    From then on, the driver ignores replies.
+    """
     stop = stopping(Motion.REVERSE)
     said = [word for tick in range(60) for word in stop.due(10.0 + 0.1 * tick)]
     before = said.index(words.SL)
@@ -257,7 +264,7 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
     """An encoder count that no wheel can reach is ignored.
 
-    Later counts are compared with the last good one.
+    So the next count is compared with the last plausible count.
     """
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
@@ -289,7 +296,8 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
     """During a motion, a smaller encoder count arrives after a larger one.
 
-    The network has delayed or duplicated the smaller count, which does not change the pose.
+    The network has delayed or duplicated the smaller count. So the smaller count does not change
+    the pose.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -300,9 +308,9 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """After a turn, a late encoder count, 3, is mistaken for the angle of the turn: 3°.
+    """A late encoder count of 3 arrives after a turn, and is mistaken for the angle of the turn.
 
-    The encoder shows that the turn was larger, so the odometry does not use the 3°.
+    But the encoder shows that the turn was larger. So the odometry does not use the 3°.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -315,9 +323,10 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """A forward drive (RM) sets the server's heading to zero. The next reply has the old heading.
+    """The first reply after the start of a forward drive (RM) still has the heading from before RM.
 
-    The server sent this reply before RM began, so the odometry does not use its heading.
+    RM sets the server's heading to zero. So the server sent this reply before RM began, and the
+    odometry does not use its heading.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
@@ -331,10 +340,10 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """The server needs some time to check the IMU. So an early ``ok`` is not a reply to the check.
+    """The server may report at once that the check of the IMU has failed.
 
-    But the server may report a failure at once, for example if the IMU is missing. So the driver
-    accepts an early failure.
+    An example is a missing IMU. So the driver accepts an early failure. It does not accept an early
+    ``ok``, because a successful check takes some time.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -34,9 +34,9 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Let the robot make two motions that end with equal encoder counts, and return the bench.
 
-    In each motion, no reply arrives for a time. This time begins with the start of the motion. It
-    ends ``quiet_s`` after the driver begins to stop the motion. Later, the function checks again
-    and again that the covariance covers the error.
+    In each motion, no reply arrives from the start of the motion until ``quiet_s`` after the driver
+    begins to stop it. Later, the function checks again and again that the covariance covers the
+    error.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -61,7 +61,8 @@ def test_a_drive_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_las
 ) -> None:
     """Two drives end with equal encoder counts. Only the replies to their stop requests arrive.
 
-    The odometry still adds both drives.
+    The equal counts look as if the second drive had not happened. The odometry still adds both
+    drives.
     """
     error = after_equal_motions((speed_mps, 0.0), 0.05).error
     assert error.way_m < 0.05
@@ -78,15 +79,16 @@ def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_t
 ) -> None:
     """No reply proves to the driver that the second of two equal motions has begun.
 
-    If the odometry leaves this motion out, the covariance covers the error.
+    The odometry may leave out the second motion. Then the covariance covers the error.
     """
     after_equal_motions(twist, quiet_s)
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The start request of a turn (L) is lost. A copy of an earlier ok arrives, but no reply to L.
+    """The start request (L) of a turn is lost. A copy of an earlier ok arrives instead of a reply.
 
-    The encoder count does not change, so the driver does not take this ok for a turn.
+    The encoder count does not change. So the driver does not conclude from this ok that the robot
+    has turned.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -115,9 +117,9 @@ def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
 
 
 def reversed_by_1000() -> MartOdometry:
-    """Return the odometry of a robot that has reversed by 1000 counts and begins a second motion.
+    """Return the odometry of a robot that has reversed by 1000 counts, and begins a second motion.
 
-    No encoder count has arrived since the second motion began.
+    No encoder count has arrived since the beginning of the second motion.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -134,7 +136,8 @@ def reversed_by_1000() -> MartOdometry:
 def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
     """The server answers the stop of a second motion with "no motion".
 
-    The server never got the start, so the covariance hardly grows.
+    This shows that the server never got the start of the second motion. So the covariance hardly
+    grows.
     """
     odometry = reversed_by_1000()
     before = odometry.doubt.total([]).xx
@@ -149,8 +152,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
     """After a second motion, the encoder count is the same as after the first motion.
 
-    Either the server never got the second start, or the second motion was equal to the first. The
-    covariance covers the error in both cases.
+    There are two possible reasons: the server never got the second start, or the second motion was
+    equal to the first one. The odometry does not know the reason. The covariance covers the error
+    in both cases.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -194,9 +198,10 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """The reply to the first stop shows whether the motion had begun.
+    """The reply to the first stop shows whether the motion had begun before this stop.
 
-    "No motion" after a second stop does not: the first stop may have ended the motion.
+    The reply "no motion" to a second stop does not show this, because the first stop may have ended
+    the motion.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
@@ -229,7 +234,7 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
     """The server answers two different queries (MCSTAT and ENC) with 0, again and again.
 
-    The driver does not take these equal answers for copies of each other.
+    Although the answers are equal, the driver does not take one answer for a copy of another.
     """
     talk = Conversation(0.3)
     for n in range(3):
@@ -249,9 +254,10 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """The driver waits for a missing reply. Instead, a copy of an older reply arrives.
+    """The driver waits for a missing reply. A copy of an older reply arrives instead.
 
-    The copy does not end the wait, so the driver sends no other query of the same form.
+    The driver recognises the copy, and continues to wait. So it sends no other query whose reply
+    has the same form.
     """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
@@ -282,7 +288,7 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
     """A doubtful encoder count may in fact be the reply to a sonar query.
 
-    So one doubtful count does not change the pose. Three doubtful counts in a row do.
+    So one doubtful count does not change the pose. Three doubtful counts in a row change it.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
@@ -330,8 +336,8 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
     """The odometry is reset during a controlled move.
 
-    The encoder count at the end of the move contains the whole move, also the distance before the
-    reset. So the odometry is wrong, and the covariance covers this error.
+    The encoder count at the end of the move contains the whole move, so it also contains the
+    distance before the reset. This makes the odometry wrong. The covariance covers the error.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -364,10 +370,11 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """The network may duplicate the request of a speed change, and the change then acts twice.
+    """The network may duplicate the request of a speed change. The change then acts twice.
 
-    Only the heading can show that it has acted twice. In a backward drive, the heading may be
-    unknown. So a change is at most 15 units in a forward drive, and 5 units in a backward drive.
+    Only the heading can show that a change has acted twice, and in a backward drive, the heading
+    may be unknown. So the driver limits each change: to 15 units in a forward drive, and to 5 units
+    in a backward drive.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05
@@ -376,9 +383,9 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
 
 
 def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
-    """The server has not reported a heading yet, and a drive begins.
+    """A drive begins before the server has reported a heading.
 
-    Each covariance is finite, so the driver's checks of the odometry reject none of them.
+    All covariances are finite. The driver's checks of the odometry would reject other covariances.
     """
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 100.0)

@@ -20,7 +20,7 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind, MartServer, MartSettin
 pytestmark = pytest.mark.slow
 
 SETTLES_S: Final = 0.9
-"""Time in s within which every reply comes, except the replies to controlled moves."""
+"""Longest time in s from a request to its reply. Only controlled moves are answered later."""
 ON_THE_WIRE: Final = {
     "RM": b"RM 30",
     "TF": b"TF 200",
@@ -44,8 +44,9 @@ KINDS: Final = {
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
     """The search finds no failure: the server does not hang, and the robot can be stopped.
 
-    It tries all cases in which up to two copies and one reply are late. The IMU may die at any
-    step. With a dead IMU, or when the driver has given up, only a crash counts as a failure.
+    The search tries all cases in which up to two copies and one reply are late. In each case, the
+    IMU may die at any step. After the IMU has died, or after the driver has given up, only a crash
+    of the server counts as a failure.
     """
     found = search()
     assert found.bad == ()
@@ -94,10 +95,10 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The test changes the model: the modelled driver sends SRM, a stop, directly after SL.
+    """The test changes the modelled driver: it now sends SRM, a stop, directly after SL.
 
-    The real driver first sends queries that show whether a motion continues, because SRM can hang
-    the server. The search finds that the changed driver hangs it.
+    SRM can hang the server at that time. So the real driver first sends queries that show whether a
+    motion continues. The search finds that the changed driver hangs the server.
     """
 
     def sweeps(world: World) -> model.Step:
@@ -145,8 +146,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    A server whose command port is silent does not show its motion, or why the port is silent. In
-    such a state, these values are replaced by fixed ones.
+    While the server's command port is silent, two values cannot be seen: the motion, and the reason
+    for the silence. This function then replaces both values by fixed ones.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
@@ -157,9 +158,9 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    A busy server executes only the commands on its stop port (SL and SS). So for a busy server,
-    only SL and SS are compared. ``L`` is not compared after the stop port has stopped a motion
-    (``released``).
+    All commands are compared, with two exceptions. A busy server executes only the commands on its
+    stop port (SL and SS), so for a busy server, only SL and SS are compared. After the stop port
+    has stopped a motion (``released``), ``L`` is not compared.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

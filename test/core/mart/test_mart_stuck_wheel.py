@@ -2,7 +2,8 @@
 
 """Tests of a wheel that is stuck in a turn, in a drive or in a controlled move.
 
-The controller reports the count of the right wheel only. It measures turns by the gyro.
+The controller reports the encoder count of the right wheel only. It measures the angle of a turn by
+the gyro.
 """
 
 import math
@@ -26,8 +27,8 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 ) -> None:
     """A wheel gets stuck during a turn to a goal. The server measures the turn only by the gyro.
 
-    The right wheel shows another angle than the gyro. So the driver discards the goal, and the
-    covariance covers the difference between the two angles.
+    The encoder of the right wheel shows another angle than the gyro. So the driver discards the
+    goal. The covariance covers the difference between the two angles.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 0.0, 2.6)
@@ -44,10 +45,10 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 
 @pytest.mark.parametrize("first_s", [0.0, 2.0])
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
-    """The left wheel is stuck, so the robot turns by half the angle that the right wheel shows.
+    """The left wheel is stuck in a turn, so the right wheel shows twice the angle of the robot.
 
-    The reply to the stop has the true angle. The driver reports the difference, and the covariance
-    covers it.
+    The server's reply to the stop contains the true angle. The driver reports the difference
+    between the two angles, and the covariance covers it.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)
@@ -87,9 +88,9 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
 def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
     vx: float, first_s: float
 ) -> None:
-    """The right wheel is stuck, so the left wheel turns the robot until the driver notices this.
+    """The right wheel gets stuck in a drive. The left wheel then turns the robot.
 
-    The driver does not measure the whole turn. The covariance covers the error.
+    The driver does not measure the whole turn. The covariance covers the error of the heading.
     """
     bench = MartBench("source").ready()
     bench.command(vx, 0.0, first_s)

@@ -137,10 +137,10 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """A frame has lost a byte. The first byte of the next header seems to complete it.
+    """A frame has lost a byte, and the first byte of the next header seems to complete the frame.
 
-    The second byte of the header then does not fit, which shows the error. The frame is not
-    returned.
+    But then the second byte of this header does not fit. This shows the error to the decoder, so it
+    does not return the frame.
     """
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -195,9 +195,9 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A «Paused: i» text that has lost one character is not returned.
+    """A «Paused: i» text that has lost one character is not returned, with one exception.
 
-    Exception: a text in which only the blank before the line feed is missing may be returned.
+    The decoder may return a text in which only the blank before the line feed is missing.
     """
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
@@ -226,9 +226,9 @@ def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: int) -> None:
-    """The board reboots while it sends a frame.
+    """The board reboots while it sends a frame. After the boot, it first sends a «Paused» text.
 
-    The «Paused» text, which it sends first after the boot, is returned at once.
+    The decoder returns this text at once.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
@@ -239,9 +239,9 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """The reader is late in the middle of a frame. Bytes wait, but none are lost.
+    """The reader is late in the middle of a frame. The rest of the frame waits, but is not lost.
 
-    They complete the frame, so no frame is lost.
+    The decoder completes the frame with these bytes, so no frame is lost.
     """
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
@@ -258,10 +258,10 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """A frame ends in FF, which may begin a header, so the decoder holds the frame.
+    """A frame ends in FF. This FF may also begin a header, so the decoder holds the frame.
 
-    A silence shows that the FF belongs to the frame. The decoder returns the frame before the one
-    that comes after the silence.
+    Then a silence shows that the FF belongs to the held frame. The decoder returns the held frame
+    before the frame that comes after the silence.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
@@ -273,8 +273,8 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 def test_flush_tells_what_can_still_be_told() -> None:
     """``flush`` returns a complete frame that the decoder has held. It returns no incomplete frame.
 
-    Before the decoder has found the sequence of frames in the stream, ``flush`` returns no complete
-    frame either.
+    It returns no frame at all as long as the decoder has not found the sequence of frames in the
+    stream.
     """
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()

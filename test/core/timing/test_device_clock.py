@@ -114,7 +114,8 @@ def test_stamps_are_even_and_true_to_a_constant(
 ) -> None:
     """From 2 s on, the steps between stamps differ from 10 ms by less than 0.2 ms (RMS).
 
-    Except for a constant error, 99 % of the stamps are right within 0.5 ms.
+    All stamps may have the same error. Apart from this constant error, 99 % of them are right
+    within 0.5 ms.
     """
     stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, 0)
     assert stamped.unevenness() < 0.2e-3
@@ -148,7 +149,10 @@ def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Ch
 
 @pytest.mark.slow
 def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
-    """Data arrives in blocks of 240 ticks. From 20 s on, the ticks' stamps are evenly spaced."""
+    """Data arrives in blocks of 240 ticks, so all ticks of a block arrive together.
+
+    The stamps of the ticks are nevertheless evenly spaced, from 20 s after the start.
+    """
     for seed in SEEDS:
         stamped = run(Board(seconds=120, skew=1e-4, imu_only=True), blocks, seed)
         assert stamped.unevenness(since_s=20.0) < 0.2e-3
@@ -184,9 +188,9 @@ def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) 
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, singles])
 def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
-    """One frame in 100 is lost. The counter of the displacements shows how many are missing.
+    """One frame in 100 is lost. The displacements' counter shows how many frames are missing.
 
-    Later stamps are not shifted.
+    So the stamps after a loss are not shifted against the true sampling times.
     """
     stamped = run(Board(seconds=40, skew=1e-4, loss=0.01), chunker, 0)
     errors = stamped.errors()
@@ -236,9 +240,9 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """The board restarts with another phase of its ticks and another SEQ. The stamps increase.
+    """A board restarts, so its ticks have another phase, and SEQ is different. The stamps increase.
 
-    Their constant offset from the true times is the same as before.
+    All stamps have the same constant offset from the true times, before the restart and after it.
     """
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
@@ -253,9 +257,9 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 @pytest.mark.parametrize("period_s", [0.01, 0.2])
 def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> None:
-    """A damaged text line arrives a second before the first frames, and does not start the clock.
+    """A damaged text line arrives a second before the first frames. It does not start the clock.
 
-    The stamps of the first frames are right, also if the host reads only five times a second.
+    The stamps of the first frames are right, even if the host reads only five times a second.
     """
     for seed in SEEDS:
         board = Board(seconds=4)
@@ -268,9 +272,9 @@ def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> Non
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """The board is silent for five seconds, and its counter SEQ does not show this.
+    """The board is silent for five seconds, but its counter SEQ does not show this silence.
 
-    The fitted clock starts again, and the stamps are right.
+    The arrival times show it. So the fitted clock starts again, and the stamps are right.
     """
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
@@ -293,9 +297,9 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """A false displacement arrives among true ones. It seems to show a restart of the board.
+    """A false displacement arrives among true ones. It looks as if the board had restarted.
 
-    The clock is not disturbed: the stamps of the samples stay 10 ms apart.
+    This does not disturb the clock: the stamps of the samples stay 10 ms apart.
     """
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
@@ -346,7 +350,7 @@ def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
 
 
 def test_displacements_alone_are_stamped_forwards() -> None:
-    """The board sends no samples, only displacements. They are stamped 40 ms apart."""
+    """The board sends no samples, only a displacement every 40 ms. The stamps are 40 ms apart."""
     clock = DeviceClock(0.01)
     reading = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k)[0] for k in range(500)]

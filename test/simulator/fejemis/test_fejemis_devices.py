@@ -115,9 +115,10 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """After a calibration of the gyro, ``eer`` or ``setid 0`` loads a configuration.
+    """A configuration without a gyro offset is loaded after a calibration of the gyro.
 
-    This configuration has no gyro offset. It replaces the calibrated offset, so the yaw drifts.
+    The command to load it is ``eer`` or ``setid 0``. The loaded configuration replaces the
+    calibrated offset, so the yaw drifts.
     """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
@@ -157,7 +158,7 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 def test_id_zero_erases_the_configuration() -> None:
     """``setid 0`` erases the configuration.
 
-    After that, ``eew`` saves nothing until another ``setid`` comes.
+    After that, ``eew`` saves nothing until the board receives another ``setid``.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")

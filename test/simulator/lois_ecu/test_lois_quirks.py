@@ -44,7 +44,7 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
-    """A board that follows the manual has no quirks, so no detector finds a quirk on it."""
+    """A board that follows the manual has no quirks. No detector finds a quirk on this board."""
     assert not SEEN[name](DOCUMENTED)
 
 

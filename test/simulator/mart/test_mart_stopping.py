@@ -68,9 +68,10 @@ def test_ss_then_sm_ends_a_spin_too() -> None:
 
 @pytest.mark.parametrize("start", ["TF 100", "TB 100", "TF SLOW 100", "TF 0"])
 def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
-    """SL on the stop port ends a controlled move. The reply to the move has the computed distance.
+    """SL on the stop port ends a controlled move.
 
-    The command port is free again.
+    The server answers the move with the computed distance. Afterwards, the command port accepts
+    commands again.
     """
     rig = Rig()
     rig.say(start)
@@ -87,9 +88,9 @@ def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
 
 @pytest.mark.parametrize("start", ["MCR 170", "MCL 170", "MCR SLOW 170"])
 def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
-    """SS on the stop port ends a controlled spin.
+    """SS on the stop port ends a controlled spin before the turn is complete.
 
-    The reply to the spin is ok, although the turn is incomplete. The command port is free again.
+    The server still answers the spin with ok. Afterwards, the command port accepts commands again.
     """
     rig = Rig()
     rig.say(start)
@@ -141,9 +142,9 @@ def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str
 
 
 def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
-    """SL on the stop port comes directly after SM on the command port. SM is still answered.
+    """SM comes on the command port. Directly after SM, SL comes on the stop port.
 
-    The stop port hangs.
+    The server still answers SM, but its stop port hangs.
     """
     rig = Rig()
     rig.drive("F")

@@ -93,7 +93,10 @@ def test_values_that_an_ended_measurement_leaves_are_told(
 def test_an_interrupted_measurement_restores_the_parameters(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-C interrupts the tool during a record. The driver gets back the values it had before."""
+    """Ctrl-C interrupts the tool during a record.
+
+    The tool then sets the driver's parameters to the values that they had before the measurement.
+    """
     robot = SimulatedRobot(tmp_path, random_motors(5))
     before = dict(robot.parameters)
     during: list[dict[str, object]] = []
