@@ -49,10 +49,11 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``: number of values that are published if the lines are undamaged.
+    ``sent``: number of values that the session on undamaged lines publishes.
 
-    ``out``, ``wrong``: number of values that are published if the lines are damaged, and number of
-    wrong values among them.
+    ``out``: number of values that the session on damaged lines publishes.
+
+    ``wrong``: number of wrong values that the session on damaged lines publishes.
 
     ``odometry``: number of compared odometry messages.
 

@@ -50,7 +50,7 @@ and not the angle.
 LEAST_STOP_S: Final = 0.3
 """Shortest time in s that the server needs to stop a controlled move after SL or SS.
 
-Only then does the server answer again.
+The server answers again only after this time.
 """
 
 

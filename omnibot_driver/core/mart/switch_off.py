@@ -66,7 +66,7 @@ class SwitchOff:
         self.underway = True
 
     def next(self) -> Request:
-        """Return the next request: OFF if a motor may be on, else RELEASE.
+        """Return the next request: OFF if a motor may be on, otherwise RELEASE.
 
         OFF is the command MCS, which writes "stop" to both motors and makes the server refuse
         motions. RELEASE is MSM, after which the server accepts motions again.

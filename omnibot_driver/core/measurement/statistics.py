@@ -23,9 +23,9 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. It shows how many IMU readings the board has sent
-      during a displacement. If fewer readings have arrived, the missing ones are counted as lost.
-      The period is None if the IMU readings themselves say how many were lost (``lost``).
+    * ``imu_period_s``: period of the IMU in s. From this period follows how many IMU readings the
+      board has sent during a displacement. If fewer have arrived, the missing ones are counted as
+      lost. The period is None if each IMU reading itself says how many were lost (``lost``).
     """
 
     imu_period_s: float | None = None
@@ -52,8 +52,11 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """Number of IMU readings that the board had sent before the last displacement: the sum of
-    ``imu`` and ``lost_imu`` at that time. None if unknown."""
+    """Number of IMU readings that the board had sent before the last displacement.
+
+    It is the sum that ``imu`` and ``lost_imu`` had at that displacement. It is None if the number
+    is unknown.
+    """
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:

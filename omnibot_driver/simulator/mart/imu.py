@@ -65,8 +65,8 @@ class Imu:
     def drift(self, now: float, *, integrates: bool) -> None:
         """Advance to ``now``. The robot has been at rest since the previous sample.
 
-        ``integrates``: whether the heading drifts in this time. The rate of the drift is the part
-        of the gyro's bias that the server does not know.
+        ``integrates``: whether the heading drifts in this time. It drifts because the server knows
+        only a part of the gyro's bias; the rest of the bias is the rate of the drift.
         """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)

@@ -167,8 +167,8 @@ class Listener(Client):
     def _lost(self) -> list[str]:
         """Return the required topics without recent data.
 
-        If a topic seems silent, pending messages are read and the topics are checked again, because
-        this program may have been too slow to read the messages.
+        If a topic seems silent, this program may have been too slow to read its messages. So the
+        function then reads the pending messages, and checks the topics again.
         """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):

@@ -67,7 +67,8 @@ def _states(log: Log) -> Iterator[Finding]:
 def _lost(states: list[Span]) -> list[Span]:
     """Return the spans in which the board was out of reach: disconnected or connecting.
 
-    Spans that end in the first 3 s (``FIRST_SECONDS``) are left out. Adjoining spans are joined.
+    Spans that end in the first 3 s of the log (``FIRST_SECONDS``) are left out. Successive spans
+    without a time between them are joined.
     """
     lost: list[Span] = []
     for state in states:

@@ -98,11 +98,11 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
-    """After a stall, the driver needs long for the first read, so the second read is late too.
+    """The driver needs long for the first read after a stall, so the second read is late too.
 
-    Bytes are lost between the two reads. The driver does not publish the first sample after the
-    lost bytes, because no pose arrives between them that could show its time. All other samples get
-    the times at which the board took them.
+    Bytes are lost between the two reads. The driver does not publish the first sample after these
+    bytes: no pose has arrived between the bytes and the sample, so its time is unknown. All other
+    samples get the times at which the board took them.
     """
     bench = nominal()
     bench.run(1.0)
@@ -120,10 +120,10 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """The driver stalls, so the terminal's buffer becomes full, and later bytes are lost.
+    """The driver stalls. The terminal's buffer becomes full, and all bytes after that are lost.
 
-    Afterwards, the reads follow each other without a pause. Still, no sample gets a stamp from the
-    time in which bytes were lost.
+    After the stall, the reads follow each other without a pause. Still, no sample gets a stamp that
+    lies in the time in which bytes were lost.
     """
     bench = nominal()
     bench.run(1.0)

@@ -164,8 +164,8 @@ COMMANDS = [
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
     """The robot obeys a command for 2.5 s. Then it has the commanded speed and turn rate.
 
-    The speed may be off by 1.2 % of the outer wheel's speed. The turn rate may be off by 3 % of the
-    outer wheel's speed divided by the track width.
+    The tolerance of the speed is 1.2 % of the outer wheel's speed. The tolerance of the turn rate
+    is 3 % of the outer wheel's speed divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)

@@ -321,9 +321,10 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A speed change that arrives twice looks as if the motors were unequal.
+    """A speed change acts twice if the network duplicates its request.
 
-    So the driver assumes at most 8 % difference between the motors.
+    This looks as if the motors were unequal. So the driver assumes at most 8 % difference between
+    the motors, whatever it measures.
     """
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)

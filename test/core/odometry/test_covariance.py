@@ -128,9 +128,10 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """The wheel sizes are uncertain, and the robot drives 10 m forward and back.
+    """The wheel sizes are uncertain, and the robot drives 10 m forward and 10 m back.
 
-    The standard deviation of the yaw after 10 m is ten times that after 1 m; at the end it is zero.
+    After 10 m, the standard deviation of the yaw is ten times the standard deviation after 1 m. At
+    the end of the drive, it is zero.
     """
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []

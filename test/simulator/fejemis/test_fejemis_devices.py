@@ -73,9 +73,9 @@ def test_the_sonar_measures_when_it_is_triggered() -> None:
 
 
 def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
-    """``gyroc`` measures the gyro for a second.
+    """``gyroc`` measures the gyro for a second, and stores the mean as the gyro's offset.
 
-    It stores the mean as offset, even if the robot turns.
+    It does this even if the robot turns.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "gyroc")
