@@ -47,18 +47,20 @@ class Interlocks:
         return "the driver is shutting down; start it again" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, so that its sender is known to be active.
+        """Record that a motion command was refused.
 
         After the motion monitor has stopped the robot, motion may be refused until no command has
-        arrived for some time. A refused command begins this time anew. Call this method for every
-        refused command, even if the refusal did not come from this class.
+        arrived for some time. A refused command shows that its sender is still active, so this
+        waiting time begins again. Call this method for every refused command, even if another class
+        has refused it.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.
 
-        Call this once for each command, because each call is recorded as the arrival of a command.
+        Call this method only once for each command, because it records each call as the arrival of
+        a command.
         """
         if self.leaving or self.missing:
             return self.why_not_request()
@@ -85,15 +87,16 @@ class Interlocks:
     def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
-        While the board is silent, the driver does not know where the robot is. Data that arrives
-        after a reset would then add motion from before the reset to the pose.
+        While the board is silent, the driver does not know where the robot is. After a reset at
+        such a time, the next data could contain motion from before the reset. This motion would
+        wrongly be added to the new pose.
         """
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN
         return NO_VALID_DATA if self._liveness.is_silent(now) else ""
 
     def why_not_task(self) -> str:
-        """Return the reason why a task, such as a recording, cannot begin; empty if it can."""
+        """Return why a task of the board, such as a recording, cannot begin; empty if it can."""
         if self.leaving:
             return self.why_not_request()
         if self._mode_manager.phase is Phase.CLOSED:

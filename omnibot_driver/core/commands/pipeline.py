@@ -32,7 +32,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.settings import SessionSettings
 
 Command = tuple[Setpoint, float]
-"""A motion that has passed the checks, and the time when it expires, in s."""
+"""A motion that has passed the checks, and the time in s at which this motion expires."""
 NEVER: Final = math.inf
 
 
@@ -78,7 +78,8 @@ class CommandPipeline:
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
         """Apply new settings to later commands and frames; return notices for the user.
 
-        A stricter limit or timeout ends a motion in progress, but not a drive to a goal.
+        If a limit or the timeout becomes stricter, a motion in progress is stopped. A drive to a
+        goal continues.
         """
         if settings.motion_monitor is not self.monitored:
             self.monitored = settings.motion_monitor
@@ -100,9 +101,9 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        If the command cannot be encoded, the robot is stopped. With the new settings, a command to
-        stand still may become a motion. Such a command is dropped, because it was not checked as a
-        motion.
+        If the command cannot be encoded, the robot is stopped. The robot is also stopped if the
+        command was a standstill before, but is a motion with the new settings. The reason is that
+        this command was not checked as a motion.
         """
         current = self.policy.current
         if current is None:
@@ -134,7 +135,7 @@ class CommandPipeline:
         )
 
     def begin(self, now: float) -> None:
-        """Discard the current command. The motion monitor forgets commands and motion so far."""
+        """Discard the current command. The motion monitor forgets earlier commands and motion."""
         self.policy.discard(now)
         self._monitor.begin()
 
@@ -150,7 +151,8 @@ class CommandPipeline:
         Raises CommandRefused if the velocity is not allowed, or if the sender's stamp is too old or
         too far in the future.
 
-        ``age_s``: age of the sender's stamp in s. The command expires earlier by this age.
+        ``age_s``: age of the sender's stamp in s. The time until the command expires is shorter by
+        this age.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -165,15 +167,18 @@ class CommandPipeline:
         return self.shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
-        """Return the command to drive to a pose in the odometry frame. It never expires."""
+        """Return the command to drive to a pose in the odometry frame, which never expires."""
         return self.shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that packets of a request, such as a start, were sent. They command no motion."""
+        """Record that packets of a request, such as a start, were sent. These command no motion."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Tell the motion monitor the newest set-point, which the robot should follow now."""
+        """Tell the motion monitor which set-point the robot should follow from ``now`` on.
+
+        It is the set-point that was sent last. During a drive to a goal, it is None.
+        """
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -186,9 +191,10 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Check how many displacements were rejected since the driver began; return notices.
+        """React to rejected displacements; return notices for the user.
 
-        Several rejected displacements in a row show that the robot does not move as commanded.
+        ``count``: number of displacements that were rejected since the driver began. If several
+        displacements are rejected in a row, the robot does not move as commanded.
         """
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
@@ -200,8 +206,8 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion is taken from the newest estimate. If there is no estimate with a motion, the
-        motion is taken from ``reading``.
+        The newest estimate gives the motion. If there is no estimate, or if the newest estimate has
+        no motion, ``reading`` gives the motion.
         """
         if not reading.possible:
             return self._monitor.count_impossible(now)
@@ -220,7 +226,10 @@ class CommandPipeline:
         return self._monitor.check(motion, seconds, now, heading_known=known)
 
     def _react_to(self, fault: Fault | None, now: float) -> list[str]:
-        """Stop a robot that does not move as commanded; return notices for the user."""
+        """React to a fault that the motion monitor has found; return notices for the user.
+
+        Some faults stop the robot.
+        """
         if fault is None:
             return []
         advice = self._advice.get(fault, "")
@@ -253,9 +262,9 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only the loss of a goal gives a notice, because the user sends a goal only once. A velocity
-        command needs no notice: it is sent repeatedly, and the driver reports the refusal of the
-        next one.
+        Only the loss of a goal gives a notice, because the user sends a goal only once. The loss of
+        a velocity command needs no notice, because the user sends such commands repeatedly: the
+        driver refuses the next one, and reports this.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
@@ -267,10 +276,10 @@ class CommandPipeline:
         ]
 
     def end_goal(self, now: float) -> list[str]:
-        """Drop the goal because of a zero ``cmd_vel``, although that command was refused.
+        """Drop the goal, because a zero ``cmd_vel`` has arrived; return notices for the user.
 
-        Return notices. The goal stays if the board's control switch does not permit velocities at
-        all.
+        The zero ``cmd_vel`` was refused, but it still ends the goal. There is one exception: the
+        goal stays if the board's control switch does not permit velocities at all.
         """
         current = self.policy.current
         if not isinstance(current, GoalSetpoint) or not self.shaper.takes_velocities:

@@ -18,8 +18,8 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.05
-"""Shortest time for which Stop is repeated, in s: 1 s from the first Stop to the last, plus the
-longest time between two Stops."""
+"""Shortest time in s for which Stop is repeated. It is the sum of two times: 1 s from the first
+Stop to the last one, and the longest time between two Stops."""
 UNPROVED_S: Final = 5.0
 """Longest time, in s, for which Stop is repeated without proof that the robot stands still."""
 ROUNDING_S: Final = 1e-6
@@ -53,7 +53,8 @@ class CommandPolicy:
         """Command in effect, or None."""
         self.commanded_at = -math.inf
         self.quiet = False
-        """Whether the policy sends nothing while it waits for the proof of the last Stop."""
+        """Whether the policy sends nothing, because it waits for the proof that the robot obeyed
+        the last Stop."""
         self.unconfirmed = False
         """Whether the repetition of Stop has ended without proof that the robot stands still."""
         self._expires_at = -math.inf
@@ -65,7 +66,7 @@ class CommandPolicy:
         self._actuator.rate_hz = settings.rate_hz
 
     def command(self, setpoint: Setpoint, now: float, *, expires_at: float) -> None:
-        """Replace the current command. This has no effect while the e-stop is latched."""
+        """Replace the current command by ``setpoint``. While the e-stop is latched, do nothing."""
         if self.latched:
             return
         self.current = setpoint
@@ -93,8 +94,9 @@ class CommandPolicy:
     def halt(self, now: float) -> None:
         """Drop the current command, and repeat Stop until a standstill is proved.
 
-        Stop is repeated for at least ``STOPPING_S``. Without proof, the repetition ends after
-        ``UNPROVED_S``. With a latched e-stop, the emergency stop is repeated until ``release``.
+        Stop is repeated for at least ``STOPPING_S``. If no proof arrives, the repetition ends after
+        ``UNPROVED_S``. If the e-stop is latched, the emergency stop is repeated instead of Stop,
+        until ``release`` is called.
         """
         self.current = None
         self.quiet = False
@@ -102,7 +104,7 @@ class CommandPolicy:
         self._actuator.apply(EMERGENCY_STOP if self.latched else STOP, now)
 
     def fall_silent(self, now: float) -> None:
-        """Send nothing more, and begin a new proof that the robot obeyed the last Stop."""
+        """Send nothing more, and wait for a new proof that the robot obeyed the last Stop."""
         self.discard(now)
         self.quiet = True
         self.proof.begin()

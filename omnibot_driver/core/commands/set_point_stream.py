@@ -20,14 +20,14 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 PACE_S: Final = 0.01
 """Shortest time between frames, in s. More frequent frames would only fill a buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. It does not slow commands at 50 Hz.
+"""Shortest time between two set-points, in s. It is short enough for commands at 50 Hz.
 
-A shorter time would be worse on a line that loses bytes. The driver would send more set-points, and
-more of them would be damaged. So the board would obey wrong set-points for a larger part of the
-time (docs/internals/integrity.md).
+An even shorter time would be harmful on a line that loses bytes. The driver would send more
+set-points, so more of them would be damaged. The board would then obey wrong set-points for a
+larger part of the time (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
-"""Lowest repetition rate of Stop and the emergency stop."""
+"""Lowest rate at which Stop and the emergency stop are repeated, in Hz."""
 
 
 class Encoder(Protocol):
@@ -37,7 +37,7 @@ class Encoder(Protocol):
         """Return the packets that make the robot stand still."""
 
     def emergency_stop(self) -> Packets:
-        """Return the packets of the board's own emergency stop. They do not contain a Stop."""
+        """Return the packets of the board's own emergency stop, without a Stop."""
 
     def encode(self, order: Order) -> Packets:
         """Return the packets that command ``order``.
@@ -52,9 +52,9 @@ class Encoder(Protocol):
 class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
-    * ``proof``: receives a report of each stop and motion sent.
-    * ``heard``: function that is called after each write, with the packets and the time. It is also
-      called for the packets of requests.
+    * ``proof``: object to which each sent stop and each sent motion is reported.
+    * ``heard``: function that is called after each write, with the written packets and the time. It
+      is called for set-points and for the packets of requests.
     """
 
     def __init__(
@@ -72,7 +72,10 @@ class SetpointStream:
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the encoding of this order is Stop. A very slow motion rounds to Stop."""
+        """Return whether this order is encoded as Stop.
+
+        A very slow motion is also encoded as Stop, because its velocity is rounded to zero.
+        """
         return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
@@ -102,11 +105,12 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        The set-point in effect is sent again at once, for two reasons. If the packets are Stop,
-        they have ended the motion. If they are not Stop, they may have caused a wrong motion: the
-        board may hold a motion frame whose last bytes were lost, and the packets complete it.
+        The set-point in effect is sent again at once. The reason depends on the packets. If they
+        are Stop, they have ended the motion. If they are not Stop, the board may hold a motion
+        frame whose last bytes were lost: the packets then complete this frame, and the board obeys
+        a wrong motion.
 
-        A zero set-point is not sent again after Stop.
+        After Stop, a zero set-point is not sent again.
         """
         if self._heard is not None:
             self._heard(packets, now)
@@ -122,7 +126,7 @@ class SetpointStream:
             self._said_at = -math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the frames to write now, and regard them as written."""
+        """Return the frames that the caller must write now, and record them as written."""
         if now < self.wake_at:
             return NO_PACKETS
         motion = self._motion

@@ -16,15 +16,15 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
-"""Longest time, in s, by which one call of ``order`` advances a ramp, even if more time has
-passed."""
+"""Longest time in s by which one call of ``order`` advances a ramp. If more time has passed since
+the last call, the ramp is still advanced by this time only."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
 """``LEAVING_M``, ``LEAVING_RAD``: limits in m and rad. If the distance or the angle to the goal
-grows by more than its limit, the robot drives away from the goal. No controller overshoots as
-far."""
+grows by more than its limit, the robot drives away from the goal. The overshoot of a controller is
+always below these limits."""
 
 
 class Authority(Enum):
@@ -44,7 +44,7 @@ class Setpoint(Protocol):
 
     @property
     def is_zero(self) -> bool:
-        """Whether the command is a standstill, which is sent at once and never ramped."""
+        """Whether the command is a standstill. A standstill is sent at once and never ramped."""
 
     @property
     def settled(self) -> bool:
@@ -52,7 +52,7 @@ class Setpoint(Protocol):
 
     @property
     def final(self) -> Order:
-        """The order that this command gives when its ramp, if any, has ended."""
+        """The order at the end of the ramp. Without a ramp, the command has only this order."""
 
     def order(self, now: float) -> Order:
         """Return the order for the time ``now``."""
@@ -107,7 +107,7 @@ class BaseSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Update ``is_zero`` for new settings. End the ramp if its final velocity is now zero."""
+        """Update ``is_zero`` for new settings. If the wanted velocity is now zero, end the ramp."""
         self.is_zero = self._is_zero(Drive(self._wanted))
         if self.is_zero:
             self._setpoint, self.settled = self._wanted, True
@@ -146,8 +146,9 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: how often the relation of these two frames had changed before the command
-      (``Odometry.alignments``). A further change makes ``place`` wrong, so the goal is discarded.
+    * ``alignment``: value of ``Odometry.alignments`` at the time of the command. It counts how
+      often the relation of these two frames has changed. After a further change, ``place`` is
+      wrong, so the goal is discarded.
     * ``check``: function that raises CommandRefused if the order to drive to ``place`` cannot be
       encoded.
     * ``direct``: whether the board drives straight to the goal.
@@ -178,13 +179,13 @@ class GoalSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Check that the order can still be encoded. Raises CommandRefused if not."""
+        """Raise CommandRefused if the order cannot be encoded with the new settings."""
         self._check(self._order)
 
     def is_left_by(self, pose: Pose) -> bool:
-        """Return whether ``pose`` is clearly farther from the goal than an earlier pose.
+        """Return whether ``pose`` is clearly farther from the goal than the nearest earlier pose.
 
-        Always False if the board does not drive straight to the goal.
+        The result is always False if the board does not drive straight to the goal.
         """
         if not self._direct:
             return False

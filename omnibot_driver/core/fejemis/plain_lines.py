@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes motion lines (``rc``) without a checksum. Their form limits the effect of damage.
+"""Writes motion lines (``rc``) without a checksum, in a form that limits the effect of damage.
 
-Some damage still has an effect: if a decimal point, a digit after it or a minus sign is lost, the
-board obeys a wrong number until the next line.
+The form does not prevent all wrong motion. If a decimal point, a digit after the decimal point or a
+minus sign is lost, the board obeys a wrong number until it receives the next line.
 """
 
 import math
@@ -19,7 +19,8 @@ def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
 def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line: the outer wheel's speed with its sign, and a turn rate of 0.
 
-    The board computes the turn from the angle of the front wheel.
+    The turn rate is not needed, because the board computes the turn from the angle of the front
+    wheel.
     """
     # The line has a source (``2``), a speed and a turn rate. The board uses only the root of the
     # sum of squares. If the source or the space after it is lost, the 0 becomes the speed: the line

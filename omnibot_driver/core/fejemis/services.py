@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests of the user other than motion: brush, lift, LED strip, and jobs such as a calibration.
+"""The user's requests, except motion: brush, lift, LED strip, and jobs such as a calibration.
 
-The module knows when each request is allowed; it does not know how it is sent or confirmed.
+The module knows when each request is allowed. It does not know how a request is sent or confirmed.
 """
 
 from typing import Final, Protocol

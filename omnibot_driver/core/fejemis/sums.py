@@ -2,8 +2,11 @@
 
 """The checksum ``;NN`` in front of a line. With it, a board detects most damaged lines.
 
-The checksum does not detect 1 in 99 random changes. It also does not detect the loss of a ``c``
-(code 99), or the loss of two characters whose codes add up to 99 or 198.
+The checksum does not detect the following damage:
+
+* 1 in 99 random changes.
+* The loss of a ``c``, because the code of ``c`` is 99.
+* The loss of two characters whose codes add up to 99 or 198.
 
 The module knows characters; it does not know the meaning of a line.
 """
@@ -27,7 +30,7 @@ def with_sum(text: bytes) -> bytes:
 
 
 def without_sum(line: bytes) -> tuple[bytes, bool | None]:
-    """Return a line's text, and whether its checksum is right (None if the line has none)."""
+    """Return a line's text, and whether its checksum is right; None if the line has no checksum."""
     if not line.startswith(b";"):
         return line, None
     found = _SUMMED(line)

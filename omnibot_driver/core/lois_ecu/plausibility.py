@@ -2,7 +2,8 @@
 
 """Plausibility of a complete report: its values, and their change since the last report.
 
-If two reports fit each other, but not the report before them, the board has restarted or was reset.
+Two successive reports may fit each other, but not the report before them. This shows that the board
+has restarted or was reset.
 
 This module works on values and arrival times.
 """
@@ -31,19 +32,20 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time. The rate can be below 1,
 because the clock of the public firmware stops while the board sends."""
 SURE_AFTER: Final = 2
-"""Number of further pairs of tick reports that must show the same unit of the board's clock, before
-the unit is regarded as known."""
+"""Number of pairs of tick reports that must confirm the unit of the board's clock after a first
+pair has shown it. Only then is the unit regarded as known."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest time in s between two tick reports that can show the clock's unit. Over a shorter time,
-the errors of the arrival times are too large."""
+"""Shortest time in s between two tick reports from which the unit of the board's clock is inferred.
+Over a shorter time, the errors of the arrival times are too large."""
 ROLLED_OUT_TURNS: Final = 0.15
 ROLLED_OUT_TICKS: Final = 1
 STARTING_TURNS_PER_S: Final = 1 / 3
-"""``ROLLED_OUT_TURNS``, ``ROLLED_OUT_TICKS``, ``STARTING_TURNS_PER_S``: limit of a wheel's count
-after a restart of the board, which counts from zero again.
+"""``ROLLED_OUT_TURNS``, ``ROLLED_OUT_TICKS``, ``STARTING_TURNS_PER_S``: terms of the largest
+plausible count of a wheel after a restart of the board.
 
-The wheel may still roll out, and may start again. At ``age`` s after the restart, the limit is
-``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, plus ``ROLLED_OUT_TICKS`` ticks.
+The restart sets the count to zero. After it, the wheel may still roll out, and may start again. So
+at ``age`` s after the restart, the largest plausible count is ``ROLLED_OUT_TURNS +
+STARTING_TURNS_PER_S * age`` turns, plus ``ROLLED_OUT_TICKS`` ticks.
 """
 
 ClockUnit = Literal["ms", "ns"]
@@ -73,8 +75,8 @@ def began_within(duration_s: float, ticks: Ticks, ticks_per_revolution: int) -> 
 class Gate(Generic[Group]):
     """Check of each report against the last accepted report of the same kind.
 
-    ``reachable(before, after, duration_s)``: whether the report ``after`` can come ``duration_s``
-    later than the report ``before``.
+    ``reachable(before, after, duration_s)``: whether the report ``after`` is possible
+    ``duration_s`` after the report ``before``.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
@@ -83,7 +85,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Return whether to accept the report ``group``. Store it to check the next report."""
+        """Return whether to accept the report ``group``. Store the report to check the next one."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):
@@ -94,27 +96,27 @@ class Gate(Generic[Group]):
         return True
 
     def would_pass(self, group: Group, now: float) -> bool:
-        """Return whether the report can follow the last accepted one. Nothing is stored."""
+        """Return whether the report can follow the last accepted report. Nothing is stored."""
         last = self._last
         return last is not None and self._reachable(last[0], group, now - last[1])
 
     def forget(self) -> None:
-        """Forget the last reports, so that the next report is accepted without a check."""
+        """Forget the last reports. The next report is then accepted without a check."""
         self._last = self._aside = None
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what a subclass has inferred from earlier reports: the counters have restarted."""
+        """Forget what a subclass has inferred from earlier reports; a restart makes it invalid."""
 
 
 class TicksGate(Gate[Ticks]):
     """Check of the reports of encoder ticks. ``ticks_per_revolution`` may be replaced at any time.
 
-    The times in the reports show whether the board's clock counts ms or ns. Later reports must show
-    the same unit.
+    The times in the reports show whether the board's clock counts ms or ns. All later reports must
+    then show the same unit.
 
-    ``too_fast``: number of reports in a row that were rejected although their clock is plausible:
-    their counts show a speed that no wheel can have.
+    ``too_fast``: number of reports in a row that were rejected only because of their counts. Their
+    clock is plausible, but their counts show a speed that no wheel can have.
     """
 
     def __init__(self, ticks_per_revolution: int) -> None:
@@ -125,7 +127,7 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Return whether to accept the ticks. Store them, and infer the unit of the clock."""
+        """Return whether to accept these ticks. Store them, and infer the unit of the clock."""
         last = self._last
         passed = super().passes(group, now)
         if passed:
@@ -193,7 +195,8 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
     """Return whether the position in a report is finite and in range.
 
-    A report of ticks has no position, so the result is True. Velocities are not checked.
+    The result for a report of ticks is True, because it has no position. Velocities are not
+    checked.
     """
     match group:
         case GpsPosition(latitude, longitude):

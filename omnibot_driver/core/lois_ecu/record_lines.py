@@ -67,11 +67,11 @@ class RecordAssembler:
         self._begin(None)
 
     def damage(self) -> None:
-        """Mark the unfinished record as damaged: one of its lines may have been lost."""
+        """Mark the unfinished record as damaged, because one of its lines may have been lost."""
         self._damaged = self.begun
 
     def add(self, code: int, payload: int) -> list[Record | LostRecord]:
-        """Add a line. Return an empty list, or a list with the record if this is its last line."""
+        """Add a line. If it ends the record, return a list with the record, else an empty list."""
         if not self.begun:
             self._begin(code)
         self._lines += 1
@@ -92,8 +92,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The end of a torque record looks like a sample of 0/0. So such a line is regarded as the end
-        only after all samples.
+        The last line of a torque record looks like a sample of 0/0. So such a line is regarded as
+        the last one only if all expected samples have arrived before it.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -22,26 +22,26 @@ STALLED_S: Final = 2.0
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 LEAST_TICKS: Final = 2
-"""Smallest number of ticks in ``STALLED_S`` for which a wheel is watched. It is computed from the
-wheel's set-point. With fewer ticks, a wheel that rolls may show no motion."""
+"""Smallest number of ticks that a wheel must make in ``STALLED_S``, by its set-point, to be
+watched. A slower wheel is not watched, because it may show no motion although it rolls."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""Two limits of a reported speed. The first is the set-point times ``TOO_FAST``, the second is
-``TOO_FAST_RPM`` RPM above the set-point. If the board repeats a speed above both limits, the speed
-is an old one, and the wheel is at rest."""
+"""Two limits of a reported speed. The first limit is the set-point times ``TOO_FAST``. The second
+limit is ``TOO_FAST_RPM`` RPM above the set-point. If the board repeats a speed that is above both
+limits, this speed is outdated, and the wheel is at rest."""
 UNLIKE: Final = 1.15
 """Largest assumed ratio between the factors of the two wheels. The factor of a wheel is its speed
-divided by its set-point. Wheels that roll backward may be too fast, but both have similar
-factors."""
+divided by its set-point. If both wheels roll backward, both may be too fast, but their factors are
+similar."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
-"""Smallest number of reports without motion after which a wheel is regarded as stalled:
-``AT_LEAST`` for a wheel commanded forward, ``AT_LEAST_BACKWARD`` for a wheel commanded backward.
-The numbers prevent a false alarm on a bad line, where few reports arrive. A wheel commanded
-backward needs more reports: an unchanged speed may show its stall, but a wheel that rolls steadily
-may show the same speed in a few reports, too."""
+"""Smallest number of reports without motion after which a wheel is regarded as stalled.
+``AT_LEAST`` is for a wheel that is commanded forward, ``AT_LEAST_BACKWARD`` for a wheel that is
+commanded backward. The numbers prevent a false alarm on a bad line, where few reports arrive. The
+number for backward is larger, because a stall backward may show only as an unchanged speed. A wheel
+that rolls steadily can also report an unchanged speed a few times."""
 
 
 class StallWatch:
@@ -49,9 +49,9 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. It may
-    roll if the board repeats a speed that is higher than those that the board usually repeats for a
-    wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. This is so
+    if the board repeats an unusually high speed: higher than the speeds that it usually repeats for
+    a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -60,8 +60,9 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.may_roll = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of reports without motion since the wheel last turned, or since it
-        was commanded to turn. Only reports that could have shown the wheel's motion are counted."""
+        """For each wheel: number of reports without motion. Counting begins at zero when the wheel
+        turns, and when the wheel is commanded to turn. A report is counted only if it could have
+        shown a motion of the wheel."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
@@ -88,8 +89,8 @@ class StallWatch:
     ) -> None:
         """Process a report: ticks, or the board's odometry.
 
-        If a wheel is commanded forward, the ticks show whether it turns. If it is commanded
-        backward, the board's odometry shows this.
+        The ticks show whether a wheel turns that is commanded forward. The board's odometry shows
+        whether a wheel turns that is commanded backward.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """
@@ -115,9 +116,9 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
-        At least ``AT_LEAST`` reports must show the standstill. For a wheel commanded backward, at
-        least ``AT_LEAST_BACKWARD`` reports must show it. If a wheel is returned as stalled, the
-        times and the reports of both wheels are counted from zero again.
+        At least ``AT_LEAST`` reports must show that the wheel does not turn. For a wheel that is
+        commanded backward, at least ``AT_LEAST_BACKWARD`` reports must show it. If one wheel is
+        returned as stalled, the times and the reports of both wheels are counted from zero again.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)
@@ -133,8 +134,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        An unchanged speed of ``wheel`` is old if the other wheel's speed has changed, or if the
-        unchanged speed is far above the set-point of ``wheel``.
+        Only an unchanged speed can be old. It is old in two cases: the speed of the other wheel has
+        changed, or the speed of ``wheel`` is far above its set-point.
         """
         if told is None or self._told is None:
             return False

@@ -17,12 +17,12 @@ AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
 """Number of starts in a row that do not turn the right wheel, after which the driver gives up. Only
-starts of a backward drive (B) or a turn (R, L) are counted. Although the right wheel rests, each of
-these starts may have turned the left wheel, and so moved the robot."""
+starts of a backward drive (B) or a turn (R, L) are counted. Each of these starts may have moved the
+robot, because the left wheel may have turned."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
-A single failed start is normal if the stop before it took long.
+One failed start is normal after a stop that took long.
 """
 
 
@@ -32,8 +32,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: whether the reply certainly answers the failed start command, and the network
-        is so good that it hardly delivers a late copy of this command.
+        ``arrived``: True if two conditions hold. The reply certainly answers the start command that
+        failed. The network is so good that it hardly delivers a late copy of this command.
         """
         word = self._start
         assert word is not None
@@ -70,7 +70,7 @@ class FailedStarts(Adjusting):
     def _not_turned(self) -> str:
         """Count a start that did not turn the right wheel.
 
-        Return a text for the user, which says what the driver does now.
+        Return a text that tells the user what the driver does now.
         """
         self._no_starts += 1
         if self._no_starts < NO_STARTS:
@@ -84,9 +84,10 @@ class FailedStarts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        This is assumed for each failure except an obstacle. The obstacle that RM reports may be in
-        front, or it may have ended an earlier backward drive. It is regarded as in front if the
-        front sonar detects an obstacle too, or if RM reports an obstacle again.
+        This is assumed for each failure that is not an obstacle. An obstacle may be in front of the
+        robot, or it may have ended an earlier backward drive. The driver assumes that it is in
+        front in two cases: the front sonar detects an obstacle too, or RM reports an obstacle
+        again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -13,9 +13,9 @@ LOWEST_SLOPE, HIGHEST_SLOPE = 0.4, 2.5
 MOST_DEAD: Final = 20.0
 """Largest number of units that a motor is assumed to need before it turns."""
 SLOPE_SD, OFFSET_SD = 0.3, 4.0
-"""Standard deviations of ``slope`` and ``offset`` in a MotorLine that has learned nothing yet.
+"""Standard deviations of ``slope`` and ``offset`` in a MotorLine before it has learned anything.
 
-Its slope is about 1, and its offset is 0. The offset is in nominal units.
+At that time, its slope is about 1, and its offset is 0. The offset is in nominal units.
 """
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 """Standard deviations of the changes of ``slope`` and ``offset`` between two measurements.
@@ -23,7 +23,8 @@ SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 The offset is in nominal units.
 """
 SURE: Final = 3.0
-"""A motor certainly turns if its expected speed is more than this number of standard deviations."""
+"""Number of standard deviations. If a motor's expected speed is more than this number of its
+standard deviations, the motor certainly turns."""
 NOISE, NOISE_PART = 0.3, 0.02
 """Standard deviation of a measured speed, in nominal units.
 
@@ -43,12 +44,12 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Improve the learned line by a ``speed`` that was measured while the motor had ``units``.
+        """Improve the line by ``speed``, which was measured while the motor had ``units``.
 
         ``speed``: in nominal units.
 
-        ``doubt``: factor for the assumed standard deviation of the measured speed. With a larger
-        factor, the measurement changes the line less.
+        ``doubt``: factor by which the assumed standard deviation of the measured speed is
+        multiplied. With a larger factor, the measurement changes the line less.
         """
         self._learned = True
         if self._ss < SLOPE_SD**2:
@@ -72,9 +73,10 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Record that the motor does not turn with ``units``. This can lower the offset.
+        """Record that the motor does not turn with ``units``, and lower the offset if necessary.
 
-        The offset is then as uncertain as at first, because an obstacle may be the true cause.
+        After this, the offset is as uncertain as at the beginning, because an obstacle may be the
+        true cause.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2
@@ -82,7 +84,8 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add ``slope`` and ``offset`` to the slope and the offset of the line.
 
-        Called if only the other motor was measured: both lines then change by the same amounts.
+        This method is called if only the other motor was measured. The lines of both motors then
+        change by the same amounts.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
@@ -98,7 +101,7 @@ class MotorLine:
         self.__dict__.update(before.__dict__)
 
     def rescale(self, factor: float) -> None:
-        """Multiply the learned speeds by ``factor``, because the nominal units have changed."""
+        """Convert the learned line to new nominal units: multiply its speeds by ``factor``."""
         if self._learned and factor != 1.0:
             self._ss, self._so, self._oo = (
                 each * factor * factor for each in (self._ss, self._so, self._oo)

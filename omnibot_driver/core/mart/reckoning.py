@@ -28,9 +28,9 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 BEGIN_RADPS: Final = 0.03
-"""Standard deviation of the turn rate, in rad/s, before the first heading of a forward drive (RM).
+"""Standard deviation, in rad/s, of the turn rate that unequal motors cause in a forward drive (RM).
 
-Unequal motors cause this turn rate.
+The value is used until the driver reads the first heading of the drive.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
@@ -39,7 +39,8 @@ ACCELERATION_RADPS2: Final = 3.0
 FRESH_S: Final = 0.2
 """Age of the last heading, in s, up to which the measured turn rate is valid."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
-"""Assumptions about the end of a forward drive (RM) if no heading was read after the stop.
+"""Assumptions about the end of a forward drive (RM), for the case that no heading was read after
+the stop.
 
 ``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate in rad/s.
 ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
@@ -49,17 +50,17 @@ ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
 class Reckoning(CorrectedPose):
     """Dead reckoning by the encoder count and the relative heading.
 
-    ``motion``: the motion to which new encoder counts belong. After the last count of a motion, it
-    is Motion.NONE.
+    ``motion``: the motion to which the next encoder count belongs. After the last count of a
+    motion, the value is Motion.NONE.
 
-    ``stands``: whether the robot was stopped; it may still coast.
+    ``stands``: whether the robot was stopped. It may still coast.
 
-    ``slowing_since_s``: time of this motion's first stop command, or None.
+    ``slowing_since_s``: time of the first stop command for this motion, or None.
 
     ``left_over_right``: expected wheel speed ratio (left / right) while the heading is unknown,
-    else None.
+    otherwise None.
 
-    ``bend``: standard deviation of that ratio.
+    ``bend``: standard deviation of ``left_over_right``.
 
     ``begins_in_move``: whether the odometry was reset during the current controlled move.
     """
@@ -96,13 +97,13 @@ class Reckoning(CorrectedPose):
     def appear(self) -> None:
         """Record that the server may have been restarted.
 
-        Its encoder count and its heading may have begun at zero again.
+        After a restart, its encoder count and its heading begin at zero again.
         """
         self.wheel.appear()
         self.heading.may_begin_anew = True
 
     def begin(self, motion: Motion, now: float) -> None:
-        """Record that the driver has started a motion. Its encoder count begins at zero."""
+        """Record that the driver has started a motion. For it, the encoder count begins at 0."""
         if motion is not Motion.REFERENCE and self.heading.from_s < self._stood_s:
             self.heading.forget()  # on some servers, the last motion has changed the heading
         self.motion, self.stands = motion, False
@@ -136,15 +137,15 @@ class Reckoning(CorrectedPose):
             self.slowing_since_s = now
 
     def stand(self, now: float) -> None:
-        """Record that the robot was stopped; it may still coast."""
+        """Record that the robot was stopped. It may still coast."""
         self.stands, self._stood_s = True, now
 
     def rest(self, longest: float = math.inf) -> float:
-        """End the motion. Called after its last encoder count, which includes the coasted distance.
+        """End the motion. Call this after its last encoder count, which includes the coasting.
 
-        After a turn on the spot, compare the angle by the wheel's encoder with the angle that the
-        server has reported. If the server's angle is implausible, return the encoder's angle minus
-        the server's angle, in rad. In all other cases, return 0.
+        After a turn on the spot, the angle from the wheel's encoder is compared with the angle from
+        the server. If the server's angle is implausible, return the encoder's angle minus the
+        server's angle, in rad. In all other cases, return 0.
 
         ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
         """
@@ -170,10 +171,10 @@ class Reckoning(CorrectedPose):
         return wrong_rad
 
     def _doubt_unread_turn(self) -> None:
-        """Add the error of an unknown turn to the pose: the turn since the last heading was read.
+        """Add an error to the pose: the robot may have turned since the last heading was read.
 
-        Called at the end of a forward drive (RM) if no heading was read after the robot was
-        stopped.
+        This method is called at the end of a forward drive (RM) if no heading was read after the
+        robot was stopped.
         """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)
@@ -197,7 +198,7 @@ class Reckoning(CorrectedPose):
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add a heading error, because it is not exactly known when the wheel speed ratio changes.
+        """Add a heading error, because the moment when the wheel speed ratio changes is uncertain.
 
         ``part``: relative change of the ratio. ``late_s``: length in s of the interval in which the
         change may happen.
@@ -208,8 +209,8 @@ class Reckoning(CorrectedPose):
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
         """Process a count of the right wheel; return the displacement since the last count.
 
-        Return None for a count that is implausible or too old, and NOTHING_MEASURED for an unknown
-        displacement.
+        If the count is implausible or too old, return None. If the displacement is unknown, return
+        NOTHING_MEASURED.
         """
         if when.from_s < self._began_s:
             return None
@@ -241,15 +242,16 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        If the start command may be lost, the last encoder count may be from before the start. So
-        the pose does not include this count. If the count is from after the start, the pose lacks
-        the motion that this property returns. Without such a count, both values are zero.
+        It is possible that the start command was lost. Then the last encoder count is from before
+        the start, so the pose does not include this count. If the count is from after the start,
+        however, the pose lacks the motion that this property returns. If there is no such count,
+        both values are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Convert a wheel's distance to a turn in rad; zero unless the robot turns on the spot."""
+        """Convert a wheel's distance in m to a turn in rad; zero except in a turn on the spot."""
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property
@@ -275,10 +277,10 @@ class Reckoning(CorrectedPose):
         return self.turn.add(turn_rad)
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct a heading that was computed from commands, once the server reports the turn.
+        """Correct a heading that was computed from commands, when the server has reported the turn.
 
-        Return the correction in rad. It ends an error of the heading, and is not a motion of the
-        robot.
+        Return the correction in rad. The correction removes an error of the heading. It is not a
+        motion of the robot.
         """
         if not self._guessed:
             return 0.0
@@ -318,7 +320,8 @@ class Reckoning(CorrectedPose):
         """Return for how many s the turn rate has been out of date, and the resulting error.
 
         The turn rate is out of date if the last heading is older than FRESH_S. The error is the
-        heading's standard deviation in rad. Both values are 0 except in a forward drive (RM).
+        heading's standard deviation in rad. In all motions except a forward drive (RM), both values
+        are 0.
         """
         stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:
@@ -329,6 +332,7 @@ class Reckoning(CorrectedPose):
 def _turn_error_rad(seconds: float) -> float:
     """Return the standard deviation, in rad, of a turn that lasts ``seconds``.
 
-    The turn is predicted from the turn rate at its beginning, which is known.
+    The turn is predicted from the turn rate at its beginning. This rate is known, but its later
+    changes are not.
     """
     return min(math.pi, ACCELERATION_RADPS2 * seconds * seconds / 2)

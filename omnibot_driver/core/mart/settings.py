@@ -13,25 +13,27 @@ from typing import Literal
 class MartSettings:
     """The settings of one robot with a MART controller.
 
-    ``metres_per_count``: distance per count of the right wheel; negative if forward counts down.
+    ``metres_per_count``: distance per count of the right wheel; negative if the count falls in a
+    forward drive.
 
     ``speed_per_unit``: speed of a wheel in m/s for one motor unit at ``nominal_volts``.
 
-    ``motor_balance``: speed of the left motor divided by the right's, at equal units.
+    ``motor_balance``: speed of the left motor divided by the speed of the right motor, at equal
+    units.
 
-    ``heading_sign``: 1 if the server's relative angle increases to the left, else -1.
+    ``heading_sign``: 1 if the server's relative angle increases to the left, otherwise -1.
 
-    ``network_delay_s``: longest time for which a datagram is on its way.
+    ``network_delay_s``: longest time in s from the sending of a datagram to its arrival.
 
     ``spin_speed``: speed of turns on the spot: "custom" (as commanded) or "fixed" (the server's
     speed SLOW).
 
-    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for moves to a goal; SLOW is used if normal
-    moves exceed them.
+    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for moves to a goal. If normal moves exceed
+    them, the server's speed SLOW is used.
 
     ``wheel_scale``: standard deviation of the wheel's size, as a fraction.
 
-    ``gyro_drift_radps``: standard deviation of the gyro's drift.
+    ``gyro_drift_radps``: standard deviation of the gyro's drift, in rad/s.
     """
 
     track_m: float = 0.40

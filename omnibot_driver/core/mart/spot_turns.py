@@ -22,58 +22,61 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: until the driver has learned from a turn, and only in the first EARLY_S (s) of a steady
-rate.
+``OFF``: limit as long as the driver has not learned from a turn. It is valid only in the first
+EARLY_S (s) of a steady rate.
 
-``OFF_AGAIN``: in all other cases. It is larger, because a new start disturbs the robot's motion
-more than a small error of the rate.
+``OFF_AGAIN``: limit in all other cases. It is larger, because a new start disturbs the robot's
+motion more than a small error of the rate.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits of what the driver learns from turns that something slows down.
 
-Both are fractions of the commanded rate.
+Both limits are fractions of the commanded rate.
 
-``HELD``: least measured rate from which the driver learns, if it has learned from a turn before.
+``HELD``: lowest measured rate from which the driver learns, if it has learned from an earlier turn.
 
-``LEAST_LESSON``: least rate that the driver learns. If the measured rate is lower, the driver
-learns the least rate instead.
+``LEAST_LESSON``: lowest rate that the driver learns. If the measured rate is lower, the driver
+learns this lowest rate instead.
 """
 EVEN: Final = 0.15
-"""Relative change of a turn's rate below which the driver learns from the turn."""
+"""Relative change of the rate during a turn, below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Limits by which the driver finds that something has held the robot in a turn.
+"""Limits by which the driver finds that something held the robot in a turn.
 
-This is assumed if the turn is slower than HINDERED and the next turn is faster than TOO_FAST. Both
-are fractions of the commanded rates.
+The driver assumes this if the turn was slower than HINDERED, and the next turn is faster than
+TOO_FAST. Both limits are fractions of the commanded rates.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
 
-``SAME``: largest relative difference of two commanded rates that are regarded as equal.
+``SAME``: largest relative difference of two commanded rates that are still regarded as equal.
 
-``CORRECTIONS``: largest number of corrections for the same rate.
+``CORRECTIONS``: largest number of corrections while the commanded rate stays the same.
 """
 STEADY: Final = 0.03
-"""Relative change above which a commanded rate is regarded as a new rate."""
+"""Relative change of the commanded rate above which it is regarded as a new rate."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-``SPINS_UP_S``: the turn must last at least this time in s, plus the averaging time of the rate.
+``SPINS_UP_S``: time in s. The turn must last at least this time, plus the averaging time of the
+rate.
 
 ``SEEN_RAD``: least angle of the turn, in rad.
 
-``TOLD_RAD``: above this angle in rad, the angle from the server is used instead of the angle that
-the wheel measured.
+``TOLD_RAD``: angle of the turn in rad, above which the angle from the server is used. Below it, the
+angle that the wheel measured is used.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Largest accepted difference between the angle in a reply to a stop command and the expected turn.
+"""Terms of a limit. The limit applies to the difference between the angle in a reply to a stop
+command and the expected turn.
 
-If the difference is larger, the number in the reply may be an encoder count instead of an angle.
 The limit is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the angle by which the
-robot turns during two queries.
+robot turns during two queries. If the difference is larger, the number in the reply may be an
+encoder count instead of an angle.
 """
 JUST_SET_S: Final = 2.0
-"""Time in s after an SSP request in which the server certainly keeps the speed that SSP has set."""
+"""Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
+"""
 SLOW_UNITS: Final = 20
 """Motor units of the server's speed SLOW, in backward drives (B) and in turns on the spot."""
 SETTING_REFUSED: Final = (
@@ -86,8 +89,8 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn, or those that the last request SSP has set for the next
-    turn. It is 0 at the beginning of a connection.
+    ``units``: motor units of the last turn. After an SSP request, they are the units that SSP has
+    set for the next turn. At the beginning of a connection, the value is 0.
 
     ``seen_radps``: measured rate of the last turn, in rad/s.
 
@@ -112,7 +115,7 @@ class SpotTurns:
 
     @property
     def is_fixed(self) -> bool:
-        """Whether all turns have the server's speed SLOW."""
+        """Whether the server makes all turns at its own speed SLOW."""
         return self._refused or self.settings.spin_speed == "fixed"
 
     def request(self, rate_radps: float) -> Request:
@@ -123,9 +126,10 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The caller must send the request before the check of the IMU that precedes the turn.
+        The driver checks the IMU before each turn. The caller must send the request before this
+        check.
 
-        ``delay_s``: shortest time in s between two SSP requests. After this time, no copy of the
+        ``delay_s``: shortest time in s between two SSP requests. When it has passed, no copy of the
         earlier request can arrive any more.
         """
         units = self._loop.spin_units(rate_radps)
@@ -135,7 +139,7 @@ class SpotTurns:
         return words.SSP.request(5, units)
 
     def answered(self, reply: Ok | Fail) -> bool:
-        """Evaluate the reply to SSP, the setting of the speed; return whether it was accepted."""
+        """Evaluate the reply to SSP, which sets the speed; return whether SSP was accepted."""
         if isinstance(reply, Ok):
             self._set_units = self.units
         else:
@@ -147,7 +151,7 @@ class SpotTurns:
         self._refused = True
 
     def forget_setting(self) -> None:
-        """Record that the server may have been restarted, and may have lost the speed of turns."""
+        """Record that the server may have been restarted and may have lost the speed of turns."""
         self._set_units = None
 
     def may_be_forgotten(self, now: float) -> bool:
@@ -162,7 +166,7 @@ class SpotTurns:
             self.units = SLOW_UNITS
 
     def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
-        """Return whether the current turn may continue while ``rate_radps`` is commanded.
+        """Return whether the current turn may continue although ``rate_radps`` is commanded now.
 
         ``turned_s``: time since the current turn began, in s.
 
@@ -201,14 +205,14 @@ class SpotTurns:
         return True
 
     def _is_seen(self, seconds: float) -> bool:
-        """Return whether a turn of this duration shows how fast the motors turn."""
+        """Return whether a turn that lasted ``seconds`` shows how fast the motors turn."""
         speeds = self._odometry.speeds
         if seconds < SPINS_UP_S + speeds.window_s or abs(self._odometry.turn.spun_rad) <= SEEN_RAD:
             return False
         return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
     def _is_held(self, seen_radps: float) -> bool:
-        """Return whether something holds the robot. Then the driver must not learn the rate."""
+        """Return whether something holds the robot, so that the driver must not learn the rate."""
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
@@ -242,8 +246,11 @@ class SpotTurns:
         ``degrees``: angle in the reply to the stop command; None if there was no angle.
 
         ``uncounted_s``: time in s from the last encoder count to the first stop command.
-        ``turned_s``: time in s since the turn began. ``disturbed``: whether the network is
-        disturbed. If so, the driver does not learn from this turn.
+
+        ``turned_s``: time in s since the turn began.
+
+        ``disturbed``: whether the network is disturbed. On a disturbed network, the driver does not
+        learn from this turn.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -267,9 +274,9 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from the previous turn, if that was slow and this turn is fast.
+        """Forget what was learned from the previous turn, if it was slow and this turn is fast.
 
-        In this case, something held the robot in the previous turn.
+        The two turns show that something held the robot in the previous turn.
 
         If this turn is slow, something may hold the robot now. So store what the driver knows
         before it learns from this turn. The next call can then restore this knowledge.

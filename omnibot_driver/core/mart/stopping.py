@@ -3,8 +3,8 @@
 """The stop of one motion: the commands to send until the server has acknowledged the stop.
 
 The network may deliver a stop command before the start command of the motion. Then the motion
-begins after the stop, so a single reply is not always a proof. This module knows commands, replies
-and times; it does not know why the robot is stopped.
+begins after the stop. So a single reply to a stop command does not always prove that the motion has
+ended. This module knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
@@ -32,11 +32,13 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""Forms of the reply ``ok`` that report the end of a motion, by motion."""
+"""For each motion: the forms of the reply ``ok`` by which the server reports the end of this
+motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s from the first stop command for a controlled move to the query of the server's name.
+"""Time in s from the first stop command for a controlled move until the driver asks for the
+server's name.
 
-By that time, the move has usually ended.
+By then, the move has usually ended.
 """
 
 SLOW_STOP: Final = (
@@ -44,20 +46,20 @@ SLOW_STOP: Final = (
     " down a slope, or the server has left a motor on; the driver continues"
 )
 NO_START_S: Final = 0.75
-"""Duration in s of a controlled turn (MCR, MCL) beyond which a wheel has certainly turned.
+"""Duration in s of a controlled turn (MCR, MCL) above which a wheel has certainly turned.
 
-If no wheel turns, the server gives up after 0.6 s. If a wheel turns, the server replies later than
-0.75 s after the start, because it then waits 0.75 s for the robot to stop.
+If no wheel turns, the server gives up 0.6 s after the start. If a wheel turns, the server waits
+0.75 s for the robot to stop before it replies. So this reply comes later than 0.75 s after the
+start.
 """
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels turned too long after the motion.
 
-    After this failure, the motors are off. If the motion is a controlled turn, the server may
-    report the failure with the text for a turn that has not begun. But a turn that lasted longer
-    than ``NO_START_S`` has certainly begun. In such a turn, the text means that the wheels turned
-    too long.
+    The motors are off after this failure. If the motion is a controlled turn, the server may report
+    the failure with a wrong text: that the turn has not begun. But a turn that lasted longer than
+    ``NO_START_S`` has certainly begun. So the text then means that the wheels turned too long.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """
@@ -72,10 +74,11 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of earlier requests whose replies are still missing. Only requests are counted
-    whose replies look like a reply to a stop command.
+    ``owed``: number of earlier requests whose replies are still missing. A request is counted only
+    if its reply looks like a reply to a stop command.
 
-    ``move``: the controlled move to stop, or None. The reply to the move itself ends the stop.
+    ``move``: the controlled move to stop; None if the motion is another one. The server's reply to
+    the move itself ends the stop.
 
     ``planned``: whether the motion is stopped without a fault, only because another motion or a
     standstill is wanted.
@@ -95,9 +98,10 @@ class Stopping:
         self.motion, self.move, self.planned = motion, move, planned
         self.began_s = now
         self.result: Ok | Fail | None = None
-        """The reply that shows how the motion ended, or None."""
+        """The reply that shows how the stopped motion ended; None if there is no such reply."""
         self.began: bool | None = None
-        """Whether the motion had begun before the stop; None if the replies do not show it."""
+        """Whether the motion had begun before the stop command; None if the replies do not show it.
+        """
         self.wake_at = now
         self.last_port = 0
         """Number of times that the stop port was used as the last resort."""
@@ -136,13 +140,14 @@ class Stopping:
     def asks_name(self, now: float) -> bool:
         """Return whether to send HELLO too, because the reply to the controlled move may be lost.
 
-        The server answers HELLO only after the move, so the answer shows that the move has ended.
+        The server answers HELLO only after the end of the move. So the answer shows that the move
+        has ended.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 
     @property
     def failed(self) -> bool:
-        """Whether the stop commands on both ports have remained unanswered."""
+        """Whether the server has left the stop commands on both ports unanswered."""
         return self.last_port >= STOP_PORT_TIMES
 
     def hear(self, reply: Reply, now: float) -> bool:
@@ -172,7 +177,7 @@ class Stopping:
         return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
     def doubt(self, reply: Ok, *, likely: bool = True) -> None:
-        """Record a doubtful reply: it answers the stop command, or it is late or a copy.
+        """Record a doubtful reply. It may answer the stop command, be late, or be a copy.
 
         ``likely``: whether the number in the reply is plausible for a reply to the stop command.
         """
@@ -183,9 +188,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        It is None if there are at most ``owed`` doubtful replies, because all of them may be late
-        replies to earlier requests. If there are more, it is the last doubtful reply with a
-        plausible value. If no value is plausible, it is the last doubtful reply.
+        All doubtful replies may be late replies to earlier requests if there are at most ``owed``
+        of them. Then the value is None. If there are more, the value is the last doubtful reply
+        with a plausible number. If no number is plausible, the value is the last doubtful reply.
         """
         if len(self._doubtful) <= self._owed:
             return None
