@@ -50,9 +50,9 @@ NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 """State of the wheels:
 
-* Sum of the robot's displacements along the board's axes, in m and rad.
+* Sum of the robot's displacements along the board's axes: x and y in m, yaw in rad.
 * Angle of each wheel, in rad.
-* Rate of each wheel, in rad/s. This tuple is empty if the rates are unknown.
+* Rate of each wheel, in rad/s; an empty tuple if the rates are unknown.
 """
 
 

@@ -30,11 +30,12 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    * ``deliver``: receives events, and the time of day in ns that belongs to the session's time 0.
-    * ``failed``: receives the exception that ended the thread. Such an exception is always a
-      defect.
+    * ``deliver``: function that receives the events, and the time of day in ns that belongs to the
+      session's time 0.
+    * ``failed``: function that receives the exception that ended the thread. Such an exception is
+      always a defect.
 
-    All function arguments except ``failed`` are called one at a time, in the order of the events.
+    The function arguments, except ``failed``, are called one at a time, in the order of the events.
     """
 
     def __init__(

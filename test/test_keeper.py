@@ -30,9 +30,9 @@ pytestmark = pytest.mark.usefixtures("no_guard_is_killed_while_it_speaks")
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """A suspended guard process does not read the new stop bytes. The driver replaces this guard.
+    """A suspended guard process does not read the new stop bytes, so the driver replaces it.
 
-    Otherwise the guard would later write outdated stop bytes.
+    Without the replacement, this guard would later write outdated stop bytes.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()

@@ -173,7 +173,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 def test_an_overrun_is_counted_once_although_another_line_is_lost_and_comes_back(
     lines: Lines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The kernel has lost bytes of two lines, 5 and 3 times. The second line is opened again.
+    """The kernel has lost bytes of two lines, 5 and 3 times. The second line is lost and reopened.
 
     The kernel counts the losses of the new connection from 0. The total remains 8.
     """

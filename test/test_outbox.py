@@ -105,7 +105,7 @@ def test_nobody_claims_what_is_not_next() -> None:
 def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
     """One thread delivers. Another thread puts events into the outbox and returns at once.
 
-    The first thread delivers these events after the event that it is delivering.
+    The first thread delivers the new events when it has delivered its own event.
     """
     outbox = Outbox()
     left: list[str] = []
@@ -173,7 +173,7 @@ def test_a_call_that_is_put_just_before_the_end_leaves_as_well() -> None:
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
     """The outbox is full, so a thread that calls ``deliver`` waits for the thread that delivers.
 
-    Otherwise the outbox would grow without limit.
+    Without this wait, the outbox could grow without limit.
     """
     outbox = Outbox()
     left: list[int] = []

@@ -29,7 +29,7 @@ lines."""
 
 
 class ByteLine(Transport, Protocol):
-    """A ``Transport`` of one channel of bytes."""
+    """A ``Transport`` with a single channel, which carries bytes."""
 
     def drop_output(self) -> None:
         """Discard the written bytes that are not sent yet."""
@@ -73,8 +73,8 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        The guard process gets copies of these descriptors. With a copy of a missing line's
-        descriptor in the guard process, the driver could not open this line again.
+        The guard process gets copies of these descriptors. It must not have a copy of a missing
+        line's descriptor, because the driver could then not open this line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -130,10 +130,10 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line.
 
-        Bytes that a line does not accept at once wait, and are sent later. If a line has had
-        waiting bytes for 0.2 s without a break, these bytes are discarded, and the line is regarded
-        as missing. The port of a missing line may still be open. It then gets only the bytes that
-        it accepts at once.
+        If a line does not accept all bytes at once, the remaining bytes wait, and are sent later.
+        If a line has had waiting bytes for 0.2 s without a break, they are discarded, and the line
+        is regarded as missing. The port of a missing line may still be open. Then only the bytes
+        that the port accepts at once are written to it.
         """
         now = time.monotonic()
         with self._writing:
@@ -281,7 +281,7 @@ class Line:
         return self._earlier_overruns + self._overruns
 
     def begin(self, port: ByteLine) -> None:
-        """Use this port, which has just been opened."""
+        """Use ``port``, which has just been opened, for this line."""
         assert port.descriptors is not None
         self.port, (self.descriptor,) = port, port.descriptors
         self.trouble, self.waits, self.watched = "", b"", False

@@ -28,7 +28,7 @@ class WakeUp:
             os.write(self._far, b"\0")
 
     def answer(self) -> None:
-        """Remove the wake-up from the pipe, so that the next wait does not end at once."""
+        """Remove the wake-up from the pipe. Otherwise the next wait would end at once, too."""
         os.read(self.descriptor, 1000)
 
     def close(self) -> None:

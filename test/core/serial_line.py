@@ -100,10 +100,10 @@ def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 def ftdi(
     *, latency_s: float = 0.016, restarted_by_data: bool = False, skew: float = 0.0
 ) -> Chunker:
-    """Return a function that splits the stream into packets of 62 bytes, as a USB adapter does.
+    """Return a function that splits the stream into packets of 62 bytes, as an FTDI adapter does.
 
-    A timer of ``latency_s`` ends a packet early. The timer runs freely, or restarts with a packet's
-    first byte (``restarted_by_data``).
+    If a timer of ``latency_s`` runs out, a packet ends with fewer bytes. The timer runs freely, or
+    begins again with a packet's first byte (``restarted_by_data``).
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:

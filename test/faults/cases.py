@@ -301,7 +301,8 @@ SERVICES: Final[dict[str, Case[Rig]]] = {
 def driver_hangs(rig: Rig) -> None:
     """Suspend the driver's process while commands continue.
 
-    The guard must stop the robot. Later, the queued commands must not move the robot.
+    The guard must stop the robot. When the driver continues, the commands that have waited must not
+    move the robot.
     """
     rig.drive()
     since = rig.line.tick

@@ -23,8 +23,8 @@ class Understood:
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
     ``alike_until``: for each write, the index of the next write that is special. A write is special
-    if it begins or ends a motion, waits for the line, may be discarded in part, or is misunderstood
-    by the receiver.
+    in four cases: it begins or ends a motion; it waits for the line; a part of it may be discarded;
+    or the receiver misunderstands it.
     """
 
     held: list[bytes]

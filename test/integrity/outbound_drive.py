@@ -161,9 +161,9 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """Act as the link does at the driver's end: send Stop until the robot is at rest.
+        """Act as the link does when the driver ends: send Stop until the robot is at rest.
 
-        If the robot is not at rest in time, the guard writes its last words.
+        If the robot is not at rest in time, act as the guard: write its last words.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)

@@ -29,7 +29,8 @@ class Items:
 def is_motion(mode: int, words: Words) -> bool:
     """Return whether a control frame is a motion.
 
-    A frame of mode 01 always is, even with zeros: under position control, zeros are a goal.
+    A frame of mode 01 is always a motion, even with zeros: under position control, zeros are a
+    goal.
     """
     return mode == 0x01 or (mode == 0x02 and any(words))
 

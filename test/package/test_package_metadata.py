@@ -189,9 +189,9 @@ def test_the_readme_names_all_libraries_of_the_tools() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """rosdep cannot install suitable versions of two libraries. A pip command installs them.
+    """The README has a pip command for two libraries that rosdep cannot install.
 
-    The README has this command, with the option that Ubuntu 24.04 requires.
+    rosdep has no suitable versions of them. The command has the option that Ubuntu 24.04 requires.
     """
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()

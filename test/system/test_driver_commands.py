@@ -102,9 +102,9 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     control: str,
     topics: list[str],
 ) -> None:
-    """The driver's executor is blocked, so a command waits for 2 s. The driver refuses it.
+    """A command waits for 2 s, because the driver's executor is blocked. The driver refuses it.
 
-    A goal is refused, too, even if its stamp is recent.
+    The driver refuses a goal, too, even if the goal's stamp is recent.
     """
     hold = tmp_path / "hold"
     board: PtyBoard = start_board(control=control, running=True)

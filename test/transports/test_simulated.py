@@ -86,7 +86,7 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """The driver does not read. A channel keeps as many bytes as a terminal would.
 
-    Later bytes are dropped and counted. The other channel still accepts bytes.
+    Later bytes of this channel are dropped and counted. The other channel still accepts bytes.
     """
 
     class Talking(toy_lines.ToyLines):

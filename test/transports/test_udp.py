@@ -81,9 +81,9 @@ def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPort
 
 
 def test_what_comes_from_another_address_is_not_heard(host: Host, transport: UdpPorts) -> None:
-    """A datagram does not come from the host's address. The port ignores the datagram.
+    """A datagram does not come from the host's address, so the port ignores it.
 
-    The reason is that anyone on the network could send such a datagram.
+    Anyone on the network could send such a datagram.
     """
     transport.write(((0, b"hello"),))
     _, driver = host.ports[0].recvfrom(99)

@@ -17,7 +17,7 @@ class CorrectionSmoother:
     """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
     In each step, the robot can move only by a certain distance and angle. The robot's own motion
-    uses a part of them, and the correction of ``pose`` uses at most the remainder.
+    uses up a part of them. The correction of ``pose`` uses at most the rest.
     """
 
     def __init__(self) -> None:
@@ -54,7 +54,7 @@ class CorrectionSmoother:
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
         """Move ``target`` by a displacement, and ``pose`` by the part of it that is allowed.
 
-        ``room_m``, ``room_rad``: largest allowed distance and angle for ``pose``.
+        ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
@@ -64,10 +64,10 @@ class CorrectionSmoother:
     def follow(self, seconds: float) -> None:
         """Move ``pose`` towards ``target``, by a part of the correction.
 
-        ``seconds``: duration of this step. It determines how large the part is.
+        ``seconds``: duration of this step. The longer the step, the larger this part.
 
-        In this step, the robot can have moved only by a certain distance and angle. ``move`` has
-        used a part of them, and the correction uses at most the remainder.
+        The robot can move only by a certain distance and angle in this step. ``move`` has used up a
+        part of them, so the correction uses at most the rest.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

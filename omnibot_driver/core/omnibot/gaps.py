@@ -3,11 +3,16 @@
 """The pauses in which the line was idle, and whether they show where frames begin.
 
 A *pause* is a time in which no bytes are read; it is not the board's paused mode. A pause has one
-of three causes: the board sends nothing, which happens only between frames; an adapter collects
-bytes; or the computer reads late (``late_reads``). The decoder passes the ends of the accepted
-frames to this module. These ends show whether this line pauses only between frames.
+of three causes:
 
-Input: positions of bytes and times; this module does not know what a frame contains.
+* The board sends nothing. This happens only between frames.
+* An adapter collects bytes.
+* The computer reads late (``late_reads``).
+
+The decoder tells this module where the accepted frames end. This shows whether the pauses on this
+line are only between frames.
+
+This module knows positions of bytes, and times; it does not know what a frame contains.
 """
 
 from bisect import bisect_right
@@ -38,9 +43,9 @@ TICK_BYTES: Final = 14 + 9 + 15
 """Largest number of bytes that the board sends in one tick (10 ms). If more bytes come in a read
 after a pause, the read was late."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses between frames that shows that the board makes the pauses.
+"""Number of pauses between frames after which the driver trusts that the board makes these pauses.
 
-After fewer pauses, an adapter may still be the cause.
+If it has seen fewer pauses, an adapter may still be their cause.
 """
 
 _FIRST: Final = attrgetter("first")
@@ -71,7 +76,7 @@ class InterFrameGaps:
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """Record a read of ``arrived`` bytes, and the pause before it if the line was idle.
+        """Record a read of ``arrived`` bytes, and the pause before it if the line was idle then.
 
         ``pause_s``: time in s since the previous read. ``place``: position of the first new byte
         among the bytes that the decoder holds. ``now``: time of the read in s.
@@ -114,7 +119,8 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Check whether the pauses are between accepted frames.
 
-        ``ends``: the position after each accepted frame, among the bytes that the decoder holds.
+        ``ends``: for each accepted frame, the position of its end in the bytes that the decoder
+        holds.
         """
         start = 0
         for end in ends:
@@ -125,7 +131,7 @@ class InterFrameGaps:
             start = end
 
     def against(self, data: bytes | bytearray, start: int, end: int) -> float:
-        """Return the cost of assuming that ``data[start:end]`` is a frame despite its pauses."""
+        """Return the cost of assuming that ``data[start:end]`` is a frame with pauses in it."""
         return sum(
             gap.price
             for gap in self._within(start, end)
@@ -141,13 +147,13 @@ class InterFrameGaps:
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
 
     def silent_within(self, start: int, end: int) -> bool:
-        """Return whether a pause of at least ``IDLE_S`` was between ``start`` and ``end``."""
+        """Return whether a pause of ``IDLE_S`` or more lies between these positions of bytes."""
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether the bytes from ``start`` on came just after a pause, within half a tick.
+        """Return whether the bytes from ``start`` on arrived within half a tick, after a pause.
 
-        If the pause was longer than ``LATE_S``, the result is False.
+        If this pause was longer than ``LATE_S``, the result is False.
         """
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
@@ -156,7 +162,7 @@ class InterFrameGaps:
         return False
 
     def forget(self, count: int) -> None:
-        """Forget the pauses in the first ``count`` bytes, which the decoder does not hold now."""
+        """Forget the pauses in the first ``count`` bytes, because the decoder has dropped them."""
         if not self.gaps or self.gaps[-1].first < count:
             self.clear()
             return

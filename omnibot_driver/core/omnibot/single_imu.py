@@ -30,12 +30,12 @@ Piece = tuple[bytes, float]
 def is_begun(
     pieces: list[Piece], data: bytes, now: float, decoder: FrameDecoder, translation: Translation
 ) -> bool:
-    """Return whether ``pieces`` and ``data`` together are an incomplete IMU frame that is due.
+    """Return whether ``pieces`` and ``data`` together are the beginning of a due IMU frame.
 
     ``pieces``: the earlier reads of this frame; may be empty. ``data``: the newest read.
 
-    If ``GAP_S`` or more has passed since the first piece, return False, because only the decoder
-    can judge a pause within a frame.
+    If ``GAP_S`` or more has passed since the first piece, there was a pause within the frame. Only
+    the decoder can judge such a pause, so the result is then False.
     """
     if pieces:
         data = joined(pieces) + data
@@ -50,7 +50,7 @@ def is_begun(
 
 
 def joined(pieces: list[Piece]) -> bytes:
-    """Return the bytes of all pieces, joined in their order."""
+    """Return the bytes of ``pieces``, joined in order."""
     return b"".join([piece for piece, _ in pieces])
 
 
@@ -88,14 +88,14 @@ def take_single(
     *,
     first: int = IMU_LENGTH,
 ) -> ImuReading | None:
-    """Return the reading of ``data`` if it is one IMU frame that was due, with usual content.
+    """Return the reading of ``data`` if it is exactly one IMU frame that is due and looks usual.
 
     Otherwise return None and change nothing. ``data`` may have come in several reads (pieces).
 
     ``first``: number of bytes in the first piece. ``now``: arrival time of the first piece in s.
 
-    If ``data`` came in pieces, the caller must have checked whether the last byte may belong to the
-    next header.
+    If ``data`` came in pieces, the caller must have excluded that the last byte belongs to the next
+    header.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -29,27 +29,27 @@ LARGEST_LOSS_TICKS: Final = 25
 If more ticks are missing, the clock is restarted.
 """
 BEAT_READS: Final = 12
-"""Number of consecutive reads of which at least one has little delay.
+"""Number of consecutive reads that certainly include a read with little delay.
 
 An adapter with a timer of 16 ms reads at five phases of a 10 ms tick. Each phase has its own delay.
-In 12 reads, each phase occurs twice, including the phase with the least delay.
+In 12 reads, each phase occurs twice, so the phase with the least delay occurs, too.
 """
 CALM: Final = 0.45
-"""Largest difference between a read's arrival and the fitted clock, in periods, for the fast path.
+"""Largest distance of a read's arrival from the fitted clock, in periods, for the fast path.
 
-The previous read must also be this near to the fitted clock. Keep the value below 0.5: half-way
-between two ticks, it is uncertain to which tick a read belongs.
+The previous read must also be within this distance. Keep the value below 0.5: half-way between two
+ticks, it is uncertain to which tick a read belongs.
 """
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period.
 
-A new fit can make the times of the fitted clock later. The stamps then approach these times slowly.
+A new fit can shift the fitted clock to later times. With this limit, the stamps follow slowly.
 """
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times do not allow a larger step."""
 
 WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
-"""Boundary of a read that ends with a complete sample."""
+"""The ``SampleBoundary`` of a read that ends with a complete sample."""
 
 
 class DeviceClock:
@@ -67,7 +67,7 @@ class DeviceClock:
         self.restart()
 
     def restart(self) -> None:
-        """Forget all ticks, because the board's next ticks are unrelated to them.
+        """Forget all ticks, because their relation to the board's next ticks is unknown.
 
         The stamps continue to increase.
         """
@@ -89,23 +89,23 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s of the last read that brought a new tick.
 
-        If the next new tick is read within half a period, both ticks had waited to be read.
+        If the next read with a new tick follows within half a period, both ticks had waited to be
+        read.
         """
         self._awaited: Point | None = None
         """Number of the next tick, and the earliest time in s at which its sample can be
         complete."""
         self._cut_off: Point | None = None
-        """Number of the tick whose sample was incomplete in the last read, and a time in s.
+        """The tick whose sample was incomplete in the last read: its number, and the earliest time
+        in s at which its sample can be complete.
 
-        The time is the earliest at which this sample can be complete.
-
-        It is valid only if the rest of the sample arrives. None if the last read ended with a
-        complete sample.
+        The time is valid only if the rest of the sample arrives. The value is None if the last read
+        ended with a complete sample.
         """
 
     @property
     def skew_ppm(self) -> float:
-        """How much faster the board's clock is than the host's, in ppm, as seen so far."""
+        """How much faster the board's clock is than the host's, in ppm, by the fitted clock."""
         line = self._line
         return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
 
@@ -169,7 +169,7 @@ class DeviceClock:
     def _due(
         self, tick: int, now: float, edge: SampleBoundary | None, readings: int
     ) -> float | None:
-        """Return the stamp in s of one new tick that came complete and on time, else None."""
+        """Return the stamp in s of one new tick if it came complete and on time, else None."""
         line = self._calm
         if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
             return None
@@ -187,8 +187,8 @@ class DeviceClock:
     def _count(self, readings: Sequence[Reading]) -> list[int]:
         """Return the tick number of each reading.
 
-        Lost readings are counted too. If the board's counter in a displacement shows another
-        number of ticks, the tick number is corrected.
+        Lost readings increase it too. If the board's own counter in a displacement shows that
+        another number of ticks has passed, the tick number is corrected.
         """
         ticks: list[int] = []
         for reading in readings:
@@ -203,7 +203,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return how many ticks the tick number lacks, by the counter in the displacement."""
+        """Return how many ticks are missing in the tick number, by the displacement's counter."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -285,8 +285,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: time in s that is left for this step. Stamps must not be later than the arrival,
-        so the other stamps of this read need time, too.
+        ``room_s``: time in s that is left for this step. It is limited: no stamp may be later than
+        the arrival, and the other stamps of this read need time, too.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

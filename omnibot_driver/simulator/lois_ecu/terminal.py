@@ -15,7 +15,8 @@ GPS, COMPASS = 1, 2
 NO_TERMINAL = (0, 4)
 PASSED_ON_DEPTH = 2048
 CHARACTERS_PER_STEP = {GPS: 0.96, COMPASS: 0.48}
-"""Number of characters that a sensor's serial line, at 9600 or 4800 baud, carries in 1 ms."""
+"""Number of characters that a sensor's serial line carries in 1 ms: the GPS at 9600 baud, the
+compass at 4800 baud."""
 
 
 class Terminal:
@@ -44,7 +45,7 @@ class Terminal:
     def heard(self, count: int) -> None:
         """Record that ``count`` characters came from the host.
 
-        In a terminal mode, the public firmware forwards them to the sensor.
+        In a terminal mode, the public firmware forwards characters from the host to the sensor.
         """
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)

@@ -151,8 +151,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    This function reproduces an error of the server. The distance of acceleration and deceleration
-    is in feet, the remaining distance is in inches, and the server adds the two numbers.
+    This function reproduces an error of the server, which adds two numbers of different units. The
+    distance of acceleration and deceleration is in feet; the remaining distance is in inches.
     """
     if motion.kind not in _TIMED:
         return 0.0

@@ -84,7 +84,7 @@ def driven(
 ) -> Column:
     """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``, ``seconds``: expected size of the whole turn, and duration of the drive.
+    ``turn_rad``: expected size of the whole turn. ``seconds``: expected duration of the drive.
 
     Raises ToolError if the drive fails.
     """

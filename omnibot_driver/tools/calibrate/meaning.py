@@ -26,7 +26,8 @@ STOPS_PART: Final = 0.5
 The early and the late speed are those of the first and the second half of a drive.
 """
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Limits of the ratio of two speeds, the second of which is measured with twice the command.
+"""Limits of the ratio of two speeds. The command for the second speed is twice the command for the
+first one.
 
 ``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: ratio up to which the
 speed is regarded as unchanged. The limits allow for friction and rounding.
@@ -118,7 +119,8 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     """Return whether the driver's frame of the odometry deltas, "earth" or "body", is right.
 
-    ``before``, ``after``: motion by the same command, before and after a turn by ``turned_rad``.
+    ``before``, ``after``: two motions by the same command. Between them, the robot turned by
+    ``turned_rad``.
 
     Raises ToolError if the motions fit neither frame.
     """

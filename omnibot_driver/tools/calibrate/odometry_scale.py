@@ -33,7 +33,7 @@ If the user measures one of two drives wrongly, the tool notices it, because the
 drives differ.
 """
 UNLIKE: Final = 4.0
-"""Number of standard deviations. If two ratios differ by more, the tool warns."""
+"""Number of standard deviations. If two ratios differ by more than this number, the tool warns."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s.

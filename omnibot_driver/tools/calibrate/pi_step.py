@@ -61,8 +61,8 @@ Records = dict[str, list[Column]]
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Record the wheels, fit their plants, tune their gains, and measure the effect.
 
-    Raises ToolError if a record or a fit fails. Before that, the tool tries to restore the
-    parameters.
+    Raises ToolError if a record or a fit fails. Before it raises the error, the tool tries to
+    restore the parameters.
     """
     goals = Goals(
         overshoot=arguments.overshoot / 100,
@@ -114,7 +114,7 @@ def _require_full_duty(parameters: Mapping[str, Any]) -> None:
 class _Bench:
     """Sets parameters, and records the wheels of the robot, which is on a box.
 
-    ``show``: called after each record with the number of records so far.
+    ``show``: function that is called after each record, with the number of records made until then.
     """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
@@ -190,7 +190,7 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
 
 
 def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loop:
-    """Return the loop with the feed-forward and the low-pass filter that the user has set."""
+    """Return ``loop`` with the user's settings of feed-forward and low-pass filter."""
     forward, low_pass = parameters.get(f"{side}_feed_forward"), parameters.get("low_pass")
     return replace(
         loop,

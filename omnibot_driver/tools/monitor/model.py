@@ -30,10 +30,11 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: limits of the pose's change between two messages, in m and m/s.
+"""``JUMP_M``, ``JUMP_MPS``: terms, in m and m/s, of the largest distance by which the pose may move
+between two messages.
 
-The pose may move by JUMP_M + JUMP_MPS · time. If it moves farther, the odometry was reset, and the
-model begins a new path.
+This distance is JUMP_M + JUMP_MPS · time between the messages. If the pose moves farther, the
+odometry was reset, and the model begins a new path.
 """
 
 

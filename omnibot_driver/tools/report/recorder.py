@@ -194,9 +194,9 @@ class Recorder:
     def _spans(
         self, role: str, start_ns: int, end_s: float, name: Callable[[Any], str]
     ) -> tuple[Span, ...]:
-        """Return the spans of time in which the text of a topic's value stayed the same.
+        """Return the spans of time in which the text for a topic's value stayed the same.
 
-        ``name``: function that converts a value to a text. The field ``what`` of a span has this
+        ``name``: function that converts a value to its text. The field ``what`` of a span has this
         text.
         """
         spans: list[Span] = []

@@ -52,10 +52,10 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The odometry names the source of its estimates. In a forward drive, the source is "ticks".
+    """The odometry names the source of its estimates, which depends on the direction of the drive.
 
-    In a backward drive, the public firmware counts no ticks, so the source is "commands and
-    heading".
+    In a forward drive, the source is "ticks". In a backward drive, the public firmware counts no
+    ticks, so the source is "commands and heading".
     """
     rig = settled(firmware)
     rig.order(20, 20, 3.0)
@@ -74,7 +74,7 @@ def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
 
 @BOTH
 def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
-    """The robot is at rest, but the board still reports its old velocity. The pose is constant."""
+    """The pose stays constant at rest, although the board still reports its old velocity."""
     rig = settled(firmware)
     rig.order(20, 25, 4.0)
     rig.order(0, 0, 2.0)
@@ -203,9 +203,9 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """After a tick report, the odometry predicts motion, and then the user changes a setting.
+    """After a tick report, the odometry predicts motion. Then the user changes a setting.
 
-    The next tick report contains the motion that was already predicted. The pose contains this
+    The next tick report contains the motion that was predicted before. The pose still contains this
     motion only once.
     """
     ours = LoisEcuSettings()
@@ -298,12 +298,12 @@ def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
 ) -> None:
     """With the board's own gains, a wheel's speed may oscillate between two reports.
 
-    More ticks than expected are a sign of this. So after a report with more ticks than expected,
-    the odometry increases the variance of a predicted speed.
+    A report with more ticks than expected is a sign of this. After such a report, the odometry
+    increases the variance of the speeds that it predicts.
     """
 
     def variance() -> float:
-        """Return a predicted speed's variance in (m/s)², after a report with 4 ticks too many."""
+        """Return the variance, in (m/s)², of the speed after a report with 4 ticks too many."""
         odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
         odometry.wrote(SetRpm(20, 20), 0.0)
         for step in range(52):

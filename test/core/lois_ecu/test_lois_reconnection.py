@@ -69,7 +69,7 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """A robot starts backward just after a reconnect, and the covariance still stays finite.
+    """The covariance stays finite if a robot starts backward just after a reconnect.
 
     The start is between the first two odometry reports of the new connection.
     """
@@ -104,10 +104,10 @@ def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_m
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """After a silence of 12 s, the tick counters are at zero.
+    """After a silence of 12 s, the tick counters are at zero. The board's clock shows why.
 
-    If the board's clock continued during the silence, the wheels have rolled back. If the clock is
-    near zero too, the board has restarted.
+    If the clock continued during the silence, the wheels have rolled back. If the clock is near
+    zero too, the board has restarted.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

@@ -29,9 +29,9 @@ def seconds_to_move(bench: MartBench, vx: float, limit_s: float = 9.0) -> float:
 def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_second(
     vx: float, firmware: Firmware
 ) -> None:
-    """Each datagram is late by up to 0.3 s. The delays begin just before the drive.
+    """Each datagram is late by up to 0.3 s. The delays begin just before the robot drives.
 
-    The driver stops none of the four drives. In at most one of them, the speed is still wrong
+    The driver stops none of the four drives. In at most one of the four, the speed is still wrong
     after 5 s.
     """
     slow = 0
@@ -60,10 +60,10 @@ def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
 
 
 def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> None:
-    """All replies to the heading query in the first 0.9 s of a drive are lost. Then one arrives.
+    """In the first 0.9 s of a drive, all replies to the heading query are lost. Then one arrives.
 
-    This heading is the first one, so it does not show that the heading is constant. The drive
-    continues.
+    It has the first known heading of the drive. One heading cannot show that the heading stays
+    constant, so the driver does not conclude that the IMU is dead. The drive continues.
     """
     bench, started_s = on(NetworkFaults(), "firmware"), math.inf
 
@@ -80,9 +80,10 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
 
 @pytest.mark.parametrize(("firmware", "seed"), [("firmware", 5), ("source", 14)])
 def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, seed: int) -> None:
-    """Replies are late, so two headings in a row are equal by chance in each drive of this test.
+    """Only three equal headings in a row show a dead IMU, and two do not.
 
-    Only three equal headings show a dead IMU, so the driver does not report a dead IMU.
+    Replies are late, so two headings in a row are equal by chance in each drive of this test. The
+    driver does not report a dead IMU.
     """
     bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
     for _ in range(3):
@@ -94,8 +95,8 @@ def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, 
 def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
     """In a drive, the reply to the encoder query (ENC) is lost. Then a later HELLO is answered.
 
-    The server answers in order, so the reply to ENC cannot come any more. The driver repeats ENC
-    within 0.25 s of the loss.
+    The server answers in order. So the answer to HELLO shows that the reply to ENC cannot come any
+    more, and the driver repeats ENC within 0.25 s of the loss.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 3.0)
@@ -171,8 +172,8 @@ def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
 ) -> None:
     """A request for a large change of the motors' units gets no answer.
 
-    Either the request or the reply is lost. The measured speeds show which one, so the driver
-    corrects the turn rate quickly.
+    Either the request or the reply is lost. The driver finds by the measured speeds which of the
+    two was lost, so it corrects the turn rate quickly.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.2, 0.4, 3.0)

@@ -36,10 +36,10 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 
 
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
-    """A tenth of all datagrams is lost in each direction: moves, replies, counts and headings.
+    """A tenth of all datagrams is lost in each direction. At most one of twelve goals is discarded.
 
-    The driver cannot exclude a duplicated move, so it discards goals, but at most one of twelve.
-    The covariance covers the error of the odometry.
+    The driver discards a goal if it cannot exclude that a move was duplicated. The covariance
+    covers the error of the odometry.
     """
     discarded = 0
     for seed in range(4):
@@ -76,9 +76,9 @@ def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
-    """Let the network deliver the next ``word`` command twice, the copy ``later_s`` later.
+    """Let the network deliver the next ``word`` command twice. The copy is ``later_s`` later.
 
-    Return a list to which this command is added when it is sent.
+    Return a list, to which this command is added when the driver sends it.
     """
     path = bench.robot.network[0].to_board
     real, moves = path.send, list[bytes]()
@@ -149,8 +149,8 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """The robot drives half as far as requested. Queries are lost for 0.7 s after the move.
 
-    The driver sends a stop command: a second run is possible. It does not know how far this robot
-    drives in one run, so it adds nothing to the pose.
+    A second run is possible, so the driver sends a stop command. It does not know how far this
+    robot drives in one run, so it adds nothing to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -280,7 +280,7 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
     """During a move, a late answer to an earlier HELLO arrives. A copy of the move follows.
 
-    The driver does not take this answer as proof that no copy runs. So it stops the copy.
+    The answer to HELLO does not prove that no copy runs. So the driver stops the copy.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]

@@ -177,9 +177,9 @@ def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
 def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
     away_s: float, firmware: Firmware
 ) -> None:
-    """Only the right wheel has an encoder. This wheel rests while the robot turns about it.
+    """The robot turns about its right wheel, which rests. Only this wheel has an encoder.
 
-    The driver finds that the server has a motion in progress, so it sends SL and SS, and repeats
+    The driver finds that the server has a motion in progress. So it sends SL and SS, and repeats
     them.
     """
     bench = met_in_a_pivot(firmware, away_s)

@@ -39,9 +39,9 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """A held robot is released. It can leap, because its wheel controllers have wound up.
+    """A held robot is released and may leap. The motion monitor does not trip.
 
-    The motion monitor does not trip.
+    The robot can leap, because its wheel controllers have wound up while it was held.
     """
     bench = driving(wheel_gains=gains)
     bench.board.grip()
@@ -58,7 +58,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 @pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """A robot that does not obey is reported again, if it has obeyed since the first notice.
+    """A robot that does not obey is reported a second time if it has obeyed in between.
 
     The user drives three times. The first and the third time, the line to the board is cut, so the
     robot does not obey. Each of these two drives gives a notice.
@@ -78,8 +78,8 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
     """The user commands 1 mm/s, and then a zero speed. No notice appears.
 
-    Neither command can show whether the robot obeys. A motion of 1 mm/s is within the noise, and a
-    robot at rest fulfils a zero speed in any case.
+    The reason is that neither command can show whether the robot obeys. A motion of 1 mm/s is
+    within the noise. A robot at rest fulfils a zero speed even if it does not obey.
     """
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)

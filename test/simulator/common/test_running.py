@@ -64,7 +64,7 @@ def test_what_came_while_the_thread_was_late_precedes_the_ticks(
 ) -> None:
     """A stop arrives while the board's thread does not run.
 
-    The stop acts before the overdue ticks.
+    When the thread runs again, the stop acts before the overdue ticks.
     """
     board = LateBoard()
     monkeypatch.setattr(time, "monotonic", lambda: board.now_s)

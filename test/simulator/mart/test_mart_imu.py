@@ -84,7 +84,7 @@ def test_the_obstacle_check_is_dead_without_an_imu() -> None:
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
     """A forward drive (RM) and its stop (SRM) are commanded while the IMU is dead.
 
-    The server answers both when the IMU works again.
+    The server answers RM and SRM when the IMU works again.
     """
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
@@ -117,7 +117,7 @@ def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() ->
 def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
     """While the IMU works, the reported heading (RMRA) changes throughout a drive.
 
-    A constant reply shows that the IMU is dead.
+    So a heading that stays constant shows that the IMU is dead.
     """
     for seed in range(8):
         rig = Rig(seed=seed)

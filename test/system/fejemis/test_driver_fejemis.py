@@ -236,9 +236,10 @@ def test_power_off_is_refused_while_driving(
 ) -> None:
     """A user calls ``~/power_off`` during a drive. The driver refuses.
 
-    At rest, the driver accepts the call, and the power goes off after a delay. A busy computer may
-    stop the robot before the first call, so that the driver accepts that call. The test then
-    cancels the power-off by ``~/start`` and tries again.
+    At rest, the driver accepts the call, and the power goes off after a delay.
+
+    On a busy computer, the robot may already be at rest at the first call, so the driver accepts
+    this call. Then the test cancels the power-off by ``~/start`` and tries again.
     """
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))

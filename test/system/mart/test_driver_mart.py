@@ -229,7 +229,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
 def test_a_zero_with_an_old_stamp_ends_a_goal(
     stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> None:
-    """The robot drives to a goal. A zero TwistStamped arrives, 600 s old by its stamp.
+    """The robot drives to a goal. Then a zero TwistStamped arrives, whose stamp is 600 s old.
 
     The driver refuses the command, but discards the goal and stops the robot.
     """
