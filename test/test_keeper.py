@@ -140,7 +140,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """Guards hang and cannot be killed. The driver starts no more guards after a limit.
 
-    The limit is ``MOST_DYING``, in this test 2.
+    The limit is ``MOST_DYING``, which is 2 in this test.
     """
     monkeypatch.setattr("omnibot_driver.keeper.MOST_DYING", 2)
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))

@@ -246,7 +246,7 @@ def ends_at_rest() -> bool:
 
 
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
-    """A link closes while the robot drives. It waits until odometry proves a standstill.
+    """A link closes while the robot drives. The close waits until odometry proves a standstill.
 
     Odometry comes every 0.4 s, or later on a busy computer.
     """

@@ -122,7 +122,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
     """A delivery raises an error in the thread that delivers.
 
-    The events that still wait are delivered by the next call of ``deliver``.
+    The events that are still in the outbox are delivered by the next call of ``deliver``.
     """
     outbox = Outbox()
     left: list[int] = []

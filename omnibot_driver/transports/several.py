@@ -100,7 +100,8 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line was lost or opened again, LinkError if all are missing.
+        Raises LinesChanged if a line was lost or opened again. Raises LinkError if all lines are
+        missing.
         """
         if not self._ready:
             self._open_missing()
@@ -264,7 +265,7 @@ class Line:
         self.retry_at = 0.0
         self.waits = b""
         self.watched = False
-        """Whether ``poll`` reports when the line accepts bytes again."""
+        """Whether ``poll`` is set to report when the line accepts bytes again."""
         self._full_since = 0.0
         self._overruns = self._earlier_overruns = 0
 

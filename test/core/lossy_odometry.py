@@ -26,7 +26,8 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 class Line:
     """A simulated board and the odometry from its frames. All readings of its IMU are zero.
 
-    ``loses``: function that decides, from a frame's bytes and time, whether the frame is lost.
+    ``loses``: function that decides whether a frame is lost. Its arguments are the frame's bytes
+    and the time.
     """
 
     def __init__(
@@ -98,8 +99,8 @@ class Line:
     def _commanding(self) -> bool:
         """Whether to command motion: the test wants to drive, and the board runs.
 
-        Otherwise zeros are commanded. A motion command would be dangerous while the board is
-        paused: the board may mistake one of its bytes for a letter such as P.
+        In all other cases, zeros are commanded. A motion command would be dangerous while the board
+        is paused, because the board may mistake a byte of the command for a letter such as P.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

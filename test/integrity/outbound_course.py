@@ -2,8 +2,9 @@
 
 """What the driver writes in a scene, which is a script of commands and requests.
 
-The writes depend only on the states that the board reports. A ``Course`` has the writes for one
-sequence of states. It is computed once, and used in all trials of the scene with these states.
+In one scene, the writes depend only on the states that the board reports. A ``Course`` has the
+writes for one sequence of states. The writes are computed once, and used in all trials of the scene
+with these states.
 """
 
 from dataclasses import dataclass
@@ -63,7 +64,7 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """How often the session ran for this course and for all courses that branch off from it."""
+        """Number of runs of the session for this course and all courses that branch from it."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

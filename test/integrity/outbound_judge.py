@@ -38,13 +38,13 @@ class Score:
     ``for_good``: number of trials in which the robot still drove at the end.
 
     ``driving_s``: total time for which the driver drove. ``frames``: number of control frames that
-    it wrote in this time.
+    the driver wrote in this time.
 
-    ``uncommanded_s``: total time of the ``uncommanded`` set-points.
+    ``uncommanded_s``: total time of the uncommanded set-points.
 
-    ``long``: number of the ``uncommanded`` set-points of over 2 ms.
+    ``long``: number of the uncommanded set-points of over 2 ms.
 
-    ``longest_s``: duration of the longest ``uncommanded`` set-point.
+    ``longest_s``: duration of the longest uncommanded set-point.
 
     ``false_estops``: number of e-stops that the board understood, but the driver did not send.
     """
@@ -75,7 +75,7 @@ class Score:
 
 
 class Judge:
-    """The judge of one trial. It gets each write, and what the board understands, in time order.
+    """The judge of one trial. It gets the driver's writes and what the board understands, in order.
 
     ``driving``: whether the driver's last write with control frames contained a motion frame.
     """
@@ -119,7 +119,7 @@ class Judge:
                 self.driving = False
 
     def writes(self, last: Items, frames: int) -> None:
-        """Record several undamaged writes of the same kind as the previous one.
+        """Record several undamaged writes that are of the same kind as the write before them.
 
         ``last``: the newest of these writes. ``frames``: the number of their control frames.
         """
@@ -152,7 +152,7 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Record a letter on which the board acts. Return "false letter" or "".
+        """Record a letter on which the board acts. Return "false letter" if it is false, else "".
 
         The letter is false if the driver sent this byte as a part of a frame.
 

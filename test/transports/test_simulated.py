@@ -60,7 +60,7 @@ def test_a_read_ends_without_a_packet() -> None:
 def test_a_read_that_waits_can_be_interrupted() -> None:
     """A read waits for data, and another thread interrupts it. The read returns without data.
 
-    Otherwise, closing would wait for a paused board.
+    If the read continued to wait, closing would wait for a paused board.
     """
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)

@@ -24,7 +24,7 @@ RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 @dataclass(slots=True)
 class GroupStatistics:
-    """Counters of groups and records since this object was created.
+    """Counters of groups and records since this object was created. A group of lines is one report.
 
     ``damaged_groups``: number of discarded groups and records. ``damaged_records``: number of
     discarded records alone.

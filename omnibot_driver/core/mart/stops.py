@@ -29,20 +29,19 @@ from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 BLIND_S, TRIPS = 0.8, 5
-"""Longest time for which the robot may drive without a new measurement.
+"""Terms of the longest time for which the robot may drive without a new measurement.
 
-It is BLIND_S (s), plus TRIPS times the average duration of an exchange.
+This time is BLIND_S (s), plus TRIPS times the average duration of an exchange.
 """
 FROZEN_S, FROZEN_TIMES = 0.5, 3
-"""Limits for a heading that stays constant. If both are reached, the driver stops the robot.
-
-The IMU may then be dead, or the robot stuck.
+"""Limits for a heading that stays constant. The driver stops the robot when both limits are
+reached, because the IMU may be dead, or the robot stuck.
 
 ``FROZEN_S``: time in s for which the heading is constant. The average duration of two exchanges is
 added to this limit.
 
-``FROZEN_TIMES``: number of replies in which the heading is constant. On a slow network, fewer
-replies may be equal by chance.
+``FROZEN_TIMES``: number of replies with the same heading. On a slow network, a smaller number of
+replies may have the same heading by chance.
 """
 NO_START_S: Final = 1.5
 """Longest allowed time in s from the start of a motion until the robot moves."""
@@ -64,11 +63,11 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel may turn unseen. The left wheel has no encoder.
 
-``STUCK_S``: time until the driver notices that the right wheel is stuck, in motions in which the
-server does not report the heading.
+``STUCK_S``: time until the driver notices that the right wheel is stuck. It applies to motions in
+which the server does not report the heading.
 
-``COASTS_S``: time for which the left wheel may still coast after a stop, if the right wheel is
-already at rest. The server has then already ended the measurement of the motion.
+``COASTS_S``: time for which the left wheel may still coast after a stop, when the right wheel is
+already at rest. At that time, the server has already ended the measurement of the motion.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -92,7 +91,7 @@ class Stops(Ground, ABC):
         return required_motion(self._order(now), self._settings.track_m)
 
     def _agrees(self, now: float) -> bool:
-        """Return whether the current motion fits the current command or job."""
+        """Return whether the motion in progress is what the current command or job needs."""
         motion, twist = self._wish(now)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
             return self._move is not None or self.jobs.moving or self._rescue
@@ -155,7 +154,8 @@ class Stops(Ground, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command. If the driver already refuses this motion, the command is kept.
+        the user's command. There is one exception: the command is kept if the driver already
+        refuses the motion in progress.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """
@@ -205,7 +205,7 @@ class Stops(Ground, ABC):
         return packets
 
     def _stopped(self, now: float) -> None:
-        """End the stop of a motion after the server's answer; evaluate how the motion ended."""
+        """End the stop of a motion after the server's answer; evaluate how this motion ended."""
         stopping, self._stopping = self._stopping, None
         self._moved_by = None  # the move was cut short
         self.conversation.settle(now)
@@ -292,8 +292,9 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Evaluate a reply that came after the driver has used the stop port.
 
-        If this reply answers a stop command, the server's stop port still waits for the end of the
-        motion. The stop port could hang the next forward drive (RM); see docs/boards/mart.md.
+        If the reply answers a stop command, the server's stop port is not free: it still waits for
+        the end of the motion. It could then hang the next forward drive (RM); see
+        docs/boards/mart.md.
 
         A reply with a number does not show that the stop port waits. Such a reply answers an
         earlier query, or the stop command of a turn on the spot, which leaves the stop port free.

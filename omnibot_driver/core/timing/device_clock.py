@@ -116,9 +116,10 @@ class DeviceClock:
 
         ``now``: time in s at which the last bytes of the readings were read.
 
-        Stamps increase from tick to tick, up to ``now``. A displacement has the stamp of its tick.
+        Stamps increase from tick to tick, and are not later than ``now``. A displacement has the
+        stamp of its tick.
 
-        ``edge``: where the read ended, relative to the board's samples; None if unknown.
+        ``edge``: position of the end of the read, relative to the board's samples; None if unknown.
         """
         if self._stamped_tick is None and now - self._seen_at > self._longest_loss_s:
             self.restart()  # only a part of a sample has arrived, long ago

@@ -38,9 +38,9 @@ def measured(
 ) -> list[Measured]:
     """Run each drive and let the user measure it; return the measurements.
 
-    ``go``: makes a drive, and returns its odometry poses.
+    ``go``: function that makes a drive, and returns its odometry poses.
 
-    ``measure``: asks the user for the end of the drive, and returns the measurement.
+    ``measure``: function that asks the user for the end of the drive, and returns the measurement.
 
     Raises ToolError if a drive fails, or if the user answers that there is not enough space.
     """

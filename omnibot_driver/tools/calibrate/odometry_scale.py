@@ -38,7 +38,8 @@ NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s.
 
-The tool finds ``COUNT``. If ``COUNT`` grows by a factor, the tool divides ``UNITS`` by this factor.
+The tool finds ``COUNT``. If the new value of ``COUNT`` is larger than the old one by a factor, the
+tool divides ``UNITS`` by this factor.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """Name, name in /diagnostics, and standard deviation of the parameter for the motors' balance.

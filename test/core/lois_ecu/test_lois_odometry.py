@@ -89,9 +89,9 @@ def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
 
 @BOTH
 def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
-    """Between two estimates, the pose is predicted, and its covariance grows.
+    """Between two estimates, the odometry predicts the pose, and its covariance grows.
 
-    The predictions are wrong by less than 3 cm on average.
+    On average, the last prediction is less than 3 cm away from the next estimate.
     """
     rig = settled(firmware)
     rig.order(20, 24, 6.0)

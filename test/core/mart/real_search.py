@@ -49,8 +49,8 @@ not counted.
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
 
-A motion that starts within this time may follow a check that was made while the IMU still worked. A
-later motion is a fault of the driver.
+The driver checks the IMU before it starts a motion. Within this time, the check may have been made
+while the IMU still worked. A later start is a fault of the driver.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
@@ -61,7 +61,8 @@ AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
 BACK_S: Final = (0.2, 0.7, 30.0)
 """Times in s from the end of the first interruption of the network to the start of the second.
 
-The second interruption lasts 1 s. After 30 s, the trial is over, so it has only one interruption.
+The second interruption lasts 1 s. With the value 30 s, the trial ends before the second
+interruption.
 """
 ENDS_S, SETTLED_S = 16.0, 1.5
 

@@ -126,10 +126,10 @@ def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: b
 
 
 def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
-    """The server does not receive the start command, nor any other datagram for 0.5 s.
+    """The server receives neither the start command nor any other datagram for 0.5 s.
 
-    The server may have been restarted. So the driver waits for 1.5 s before it sends a start
-    command again.
+    The driver cannot exclude that the server was restarted. So it waits for 1.5 s before it sends a
+    start command again.
     """
     bench = on(NetworkFaults(), "firmware")
     network, away_s = bench.robot.network[0], math.inf
@@ -150,7 +150,8 @@ def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
 def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
     """A piece of a downloaded file is lost, and the driver waits for it for 1 s.
 
-    This silence is not taken for a restart of the server: the next drive begins at once.
+    The driver does not take this silence for a restart of the server, so the next drive begins at
+    once.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 2.0)

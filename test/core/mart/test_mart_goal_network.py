@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
     seed: int, firmware: Firmware
 ) -> None:
-    """Replies come up to 0.1 s late and in another order. The robot reaches each goal.
+    """Replies come up to 0.1 s late and in another order. The robot still reaches each goal.
 
     The driver does not mistake the delays for a duplicated move.
     """
@@ -59,8 +59,8 @@ def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
 def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
     """A tenth of all datagrams arrives twice, so the server runs some moves twice.
 
-    The driver stops the second run and estimates the first one. It discards few goals. Where the
-    odometry is wrong, its covariance says so.
+    The driver stops the second run of a move and estimates the first run. It discards few goals. If
+    the odometry is wrong, its covariance is large enough for this error.
     """
     said = ""
     for seed in (0, 1, 5, 6, 10, 11):
@@ -123,9 +123,9 @@ def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
 def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_before(
     word: bytes, later_s: float
 ) -> None:
-    """A move runs twice. The user resets the odometry before the encoder is read.
+    """A move runs twice. The user resets the odometry before the driver reads the encoder.
 
-    The first run lies before the reset, so the driver does not add it to the pose.
+    The first run was before the reset, so the driver does not add it to the pose.
     """
     bench = on(NetworkFaults(), "source")
     reach(bench, Pose(0.6, 0.0, 0.0))
@@ -174,8 +174,8 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
     """The reply to each turn is lost. The driver sends a stop, and the server answers "no motion".
 
-    This shows that the turn was completed. The encoder count of the turn began at zero, so the
-    odometry must not subtract the last count of the drive before the turn.
+    The answer shows that the turn was completed. The encoder count began at zero with the turn. So
+    the odometry must not subtract the last count of the drive before the turn.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -194,8 +194,8 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
     """After a turn, the driver reads only the encoder, then begins the next straight move.
 
-    The first heading that it reads after the straight move contains the turn. The odometry has
-    already counted the turn by the encoder, so it does not add the turn again.
+    After the straight move, the driver reads a heading again, which contains the turn. The odometry
+    has already counted the turn by the encoder, so it does not add the turn again.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))

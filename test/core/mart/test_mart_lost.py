@@ -14,10 +14,10 @@ pytestmark = pytest.mark.slow
 def outlived(
     firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
 ) -> MartBench:
-    """Return a bench whose server has a stop port that hangs.
+    """Return a bench with a server whose stop port hangs.
 
-    The IMU died in a motion, so the driver used the stop port. The stop port has hung since then.
-    Now the IMU works again.
+    The IMU died in a motion, so the driver used the stop port, which has hung since then. Now the
+    IMU works again.
     """
     bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
     bench.command(*motion, 2.5)
@@ -46,9 +46,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """The IMU dies in a motion and works again later, but the server's stop port stays hung.
 
-    The driver refuses motion until the heading shows a restart. Then the network fails for a time.
-    Meanwhile, the heading drifts, or a user turns the robot by hand. The driver does not take the
-    new heading for a sign of a restart, so it still refuses motion.
+    The driver refuses motion until the heading shows that the server was restarted. Then the
+    network fails for a time. Meanwhile, the heading changes, because it drifts or because a user
+    turns the robot by hand. This change is not a sign of a restart, so the driver still refuses
+    motion.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -72,10 +73,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     delay_s: float, seed: int
 ) -> None:
-    """The IMU dies in a motion, so the server hangs in the driver's stop command.
+    """The IMU dies in a motion, so the server hangs when the driver commands a stop.
 
     The driver uses the stop port, which then hangs. When the IMU works again, the server answers
-    all waiting requests at once, and the network reorders the replies. The driver refuses motion,
+    all requests that have waited, and the network reorders the replies. The driver refuses motion,
     even if the server's name arrives before the reply to the stop command.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
@@ -92,10 +93,10 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
     met: bytes, wait_s: float, delay_s: float
 ) -> None:
-    """A driver starts while the server executes RM or B, and the IMU has died.
+    """A driver starts while the server executes RM or B with a dead IMU.
 
-    The server hangs in the first stop command, so the driver uses the stop port. When the IMU works
-    again, the driver refuses motion.
+    The server hangs in the first stop command, so the driver uses the stop port, which then hangs,
+    too. When the IMU works again, the driver refuses motion.
 
     ``wait_s``: time in s from the driver's start until the IMU works again.
     """
@@ -136,8 +137,8 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
     """The server's process is stopped while the robot is at rest, and continues after 5 s.
 
-    Meanwhile the driver has used the stop port. The server then answers the queries that have
-    waited. The driver does not regard the values in these replies as results of a motion, so it
+    In these 5 s, the driver uses the stop port. Then the server answers the queries that have
+    waited. The driver does not take the values in these replies for results of a motion, so it
     drives the robot again.
     """
     bench = MartBench("source").ready()

@@ -17,7 +17,7 @@ def test_what_was_commanded_before_it_ends_with_stop(
 ) -> None:
     """Another program pauses the board and starts it again.
 
-    The board may then resume an old command. So the driver sends Stop for 1 s.
+    The board may then resume a command from before the pause. So the driver sends Stop for 1 s.
     """
     bench = Bench(BoardSettings(seed=2, running=True, imu_only=imu_only), run=run)
     bench.open()

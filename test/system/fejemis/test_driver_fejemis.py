@@ -201,9 +201,9 @@ def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> 
 
 
 def test_a_driver_that_ends_does_not_move_the_lift_again(new: New) -> None:
-    """Lift commands continue while the driver stops the robot and ends.
+    """Lift commands continue to arrive while the driver stops the robot and ends.
 
-    When the driver has switched the lift off, it sends the lift no voltage any more.
+    The driver switches the lift off. After this, it sends the lift no voltage any more.
     """
     robot, driver, probe = new
     lift = probe.publisher(Float32, "lift_cmd")
