@@ -27,8 +27,9 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
 rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Ratio of two misfits (``_Sender.misfit_s``): 1 s too early for a sender fits as badly as 10 s too
-late. A message is assigned to the sender that it fits best."""
+"""Factor for the misfit of a message that is too early for a sender (``_Sender.misfit_s``). With
+this factor, a message that is 1 s too early fits as badly as a message that is 10 s too late. A
+message is assigned to the sender that it fits best."""
 ALIKE_S: Final = 0.02
 """Two senders fit a message equally well if their misfits (``_Sender.misfit_s``) differ by at most
 this time, in s. The message is then assigned to the sender whose last message had the higher
@@ -39,8 +40,8 @@ KNOWN_AFTER: Final = 10
 fewer messages, all of them may have been delayed."""
 
 Differences = tuple[float, float]
-"""Arrival by our clock minus sending by the sender's clock, in s. The first value is by our time of
-day, the second by our steady clock."""
+"""Two differences: arrival by our clock minus sending by the sender's clock, in s. For the first
+difference, our clock is our time of day. For the second, it is our steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,8 +67,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: possible times of sending by our clock. While the offset of the sender's clock is
-      unknown, there are two possible times. Otherwise there is one.
+    * ``sent_ns``: time of sending by our clock. While the offset of the sender's clock is unknown,
+      these are two possible times. Otherwise it is one time.
     """
 
     total_s: float
@@ -141,8 +142,8 @@ class Transit:
 class _Sender:
     """One sender on a topic.
 
-    It stores two offsets: that of our time of day from the sender's clock, and that of our steady
-    clock from the sender's clock.
+    It stores two offsets from the sender's clock: that of our time of day, and that of our steady
+    clock.
     """
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
@@ -151,15 +152,20 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Return whether this sender can have sent message ``number``: its numbers increase."""
+        """Return whether message ``number`` can be from this sender.
+
+        The numbers of a sender's messages increase, so the number must be larger than the last one.
+        An unknown number is possible for each sender.
+        """
         return number is None or self.number is None or self.number < number
 
     def misfit_s(self, differences_s: Differences, at_s: float) -> tuple[float, float]:
         """Return the smallest and the largest possible misfit of a message to this sender, in s.
 
-        The misfit is the time by which the message is too late for this sender; 0 fits exactly. If
-        the message is too early, the misfit is ten times (``CLOCK_RETREATS``) the time by which it
-        is too early. The exact misfit is unknown, because the clocks drift.
+        The misfit says how badly the time of the message fits this sender; 0 fits exactly. If the
+        message is too late, the misfit is the time by which it is too late. If the message is too
+        early, the misfit is ten times (``CLOCK_RETREATS``) the time by which it is too early. The
+        exact misfit is unknown, because the clocks drift.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
@@ -189,16 +195,15 @@ class _Offset:
     def late_s(self, difference_s: float, at_s: float) -> float:
         """Return how late a message is at least, in s: ``difference_s`` minus offset and drift.
 
-        The result is negative if the difference is smaller than the sum of the offset and the
-        largest possible drift. ``difference_s``: arrival by our clock minus sending by the sender's
-        clock.
+        The drift is the largest possible one, so the result may be negative. ``difference_s``:
+        arrival by our clock minus sending by the sender's clock.
         """
         return difference_s - self._least_s - self._drift_s(at_s)
 
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest possible misfit of a message to this one offset.
+        """Return the smallest and the largest possible misfit of a message, for this offset alone.
 
-        ``_Sender.misfit_s`` explains the misfit.
+        ``_Sender.misfit_s`` defines the misfit.
         """
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS

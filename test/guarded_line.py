@@ -81,7 +81,7 @@ def children() -> list[int]:
 
 
 def started(pid: int) -> None:
-    """Wait until the guard process ignores SIGTERM, which shows that its program runs."""
+    """Wait until the guard process ignores SIGTERM. Then the guard's program runs."""
     end = time.monotonic() + PATIENCE_S
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:
@@ -95,7 +95,10 @@ def status_of(pid: int, field: str) -> str:
 
 
 def alive(keeper: Keeper, seconds: float) -> float:
-    """Send heartbeats for ``seconds`` at the driver's rate. Return their longest interval in s."""
+    """Send heartbeats for ``seconds`` at the driver's rate.
+
+    Return the longest time between two heartbeats, in s.
+    """
     begun_s = beaten_s = time.monotonic()
     longest_s = 0.0
     while (now := time.monotonic()) < begun_s + seconds:

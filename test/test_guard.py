@@ -82,10 +82,11 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """The driver changes the board's stop bytes, because they depend on the state of the board.
+    """New stop bytes are valid at once, for the present guard process and for its successor.
 
-    The present guard process writes the new bytes. If another guard process replaces it, that
-    process writes the new bytes, too.
+    The driver changes the stop bytes when the state of the board changes. The present guard process
+    then writes the new bytes. If another guard process replaces it, that process writes the new
+    bytes, too.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -212,7 +213,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """A board has two lines, and one is gone. The guard process stops the robot on the other line.
+    """The guard process stops the robot on one line, although the board's other line is gone.
 
     Each line gets only its own stop bytes.
     """

@@ -2,8 +2,9 @@
 
 """Tests of a zero command that arrives too late while the robot drives to a goal.
 
-Such a command usually ends the goal, although the driver refuses it. The reasons: a goal does not
-expire, and a joystick that is released sends its zero command only once.
+Such a command usually ends the goal, although the driver refuses it. There are two reasons why it
+must end the goal: a goal does not expire, and a joystick that is released sends its zero command
+only once.
 """
 
 import math
@@ -36,9 +37,9 @@ def obey_an_old_stamp(session: Session, data: bytes, now: float) -> None:
 
 
 class Topic:
-    """The topic cmd_vel of a driver, with the session of the bench.
+    """The topic cmd_vel of a driver.
 
-    The driver's clocks show the simulated time of the bench.
+    The driver uses the session of the bench. Its clocks show the simulated time of the bench.
     """
 
     def __init__(self, bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,10 +103,10 @@ def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
 def test_a_late_zero_is_refused_but_ends_a_goal(
     action: Action, late_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The zero command of a released joystick is too old when it arrives. The driver refuses it.
+    """A zero command that is too old is refused, but it ends the drive to a goal.
 
-    But the driver ends the drive to the goal. The robot stops well before the goal, and a notice
-    gives the reason.
+    A released joystick sends the zero command, which arrives too late. The robot stops well before
+    the goal, and a notice gives the reason.
     """
     bench, topic = on_the_way(monkeypatch)
     topic.action = action
@@ -144,10 +145,10 @@ def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -
 def test_a_zero_ends_no_goal_on_a_board_whose_switch_is_on_positional_control(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """``control_method`` is ``position``, and the robot drives to a goal. Zeros arrive on cmd_vel.
+    """A zero on cmd_vel does not end a goal if the board's switch is set to positional control.
 
-    With this control method, the driver refuses all commands on cmd_vel. So the goal stays in
-    effect.
+    ``control_method`` is ``position``, and the robot drives to a goal. With this control method,
+    the driver refuses all commands on cmd_vel. So the goal stays in effect.
     """
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()

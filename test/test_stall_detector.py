@@ -166,9 +166,9 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 
 
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
-    """A stall that makes the guard process act is long enough for the driver to notice it.
+    """The driver notices each stall that makes the guard process act.
 
-    If the driver did not notice it, the guard process and the driver would send contradictory
-    commands.
+    If the driver did not notice such a stall, it would send motion commands while the guard process
+    sends stop bytes.
     """
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

@@ -60,7 +60,8 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """Values from which ``shown`` was computed. If they change, ``shown`` is computed again."""
+        """Values from which the attribute ``shown`` was computed. If they change, ``shown`` is
+        computed again."""
 
     @property
     def state(self) -> str:

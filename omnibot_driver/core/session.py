@@ -127,10 +127,10 @@ class Session:
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
         """Apply new settings to later commands and frames.
 
-        A stricter limit or timeout stops the robot, unless it drives to a goal. A new scale of the
-        odometry drops a goal.
+        If a limit or timeout becomes stricter, the robot is stopped, except while it drives to a
+        goal. If the scale of the odometry changes, the current goal is dropped.
 
-        ``board``: new settings of the board itself; the current command is encoded again.
+        ``board``: new settings of the board itself. The current command is then encoded again.
         """
         self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:
@@ -224,7 +224,7 @@ class Session:
         self._reporter.notify(self._commanding.end_goal(now))
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Start, pause or reset the board. A RequestDone answers later.
+        """Start, pause or reset the board. A RequestDone event reports the result later.
 
         Raises RequestRefused at once if the request is not possible now.
         """
@@ -238,7 +238,7 @@ class Session:
             self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
-        """Measure the gyro's bias. A RequestDone answers later.
+        """Measure the gyro's bias. A RequestDone event reports the result later.
 
         Raises RequestRefused at once if a measurement is not possible now.
         """

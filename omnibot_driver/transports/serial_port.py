@@ -29,8 +29,8 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""Options of a network socket. A peer that acknowledges nothing for five seconds is regarded as
-lost."""
+"""Options of a network socket. If the peer does not acknowledge data for five seconds, it is
+regarded as lost."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Major device numbers of pseudo-terminals in Linux."""
 

@@ -119,7 +119,10 @@ def linearity() -> list[str]:
 
 
 def cold(ticks: int) -> str:
-    """Measure the time from an IMU frame's bytes to its reading, with warm and with cold caches."""
+    """Measure the time from an IMU frame's bytes to its reading, with warm and with cold caches.
+
+    In every second tick, the caches are overwritten before the measurement, so they are cold.
+    """
     session, board = _session(), SimulatedBoard(BoardSettings(seed=1, running=True))
     other = bytearray(OTHERS_BYTES)
     taken: dict[bool, list[float]] = {False: [], True: []}

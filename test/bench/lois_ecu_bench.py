@@ -125,7 +125,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 def _latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return the time from each command to the first read that contains its line, in µs."""
+    """Return the time from each command to the first read that contains the command, in µs."""
     found = []
     times = [at for at, _ in heard]
     for at, speed in sent:

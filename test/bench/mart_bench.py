@@ -2,9 +2,9 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-The floor is the smallest program with the same output, without any checks. The driver has a
-simulated controller on UDP, and the floor has another one. If the driver waits for the reply to a
-query, it sends a new speed only after this reply, but it sends a stop at once.
+The driver is compared with the floor: the smallest program with the same output, without any
+checks. Driver and floor each have their own simulated controller on UDP. While the driver waits for
+the reply to a query, a new speed waits too. A stop does not wait: the driver sends it at once.
 """
 
 import time

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driver and floor on a small computer: each gets a share of one core, by Linux's cgroups.
+"""Measurement of the driver and the floor on a simulated small computer.
 
-The period of the cgroup is the shortest that the kernel permits, so the processes run evenly. Only
-root can run this program. The floor is the smallest program with the same output as the driver,
-without any checks.
+The floor is the smallest program with the same output as the driver, without any checks. Linux's
+cgroups give each of the two programs a share of one core. The period of a cgroup is the shortest
+that the kernel permits, so the programs run evenly. Only root can run this measurement.
 """
 
 import math
@@ -21,11 +21,8 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core that are measured one after the other.
-
-In each measurement, the driver and the floor get one such share each. The floor is the smallest
-program with the same output.
-"""
+"""Shares of one core. The measurement is repeated for each share: the driver gets this share, and
+the floor gets an equal share. The floor is the smallest program with the same output."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""

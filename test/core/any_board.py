@@ -234,7 +234,8 @@ class AnyBench:
     def run(self, seconds: float) -> None:
         """Advance the simulated time by ``seconds``.
 
-        As in the driver, the session is called only when data arrives or when it is due.
+        The session is called only when data arrives, or when its time ``wake_at`` is reached. The
+        driver calls it in the same way.
         """
         wake_s = self.session.wake_at
         for _ in range(round(seconds / TICK_S)):

@@ -25,7 +25,8 @@ TICKS: Final = 3000
 SILENCE_S: Final = 1.0
 """Shortest interruption of the data, in s, after which the driver is allowed to blame the cable."""
 TRANSIT: Final = 200
-"""Number of frames that are sent before a comparison begins, but may be published after that."""
+"""Largest number of frames that are in transit when a comparison begins: the board has sent them
+before, but the driver may publish them after that."""
 REACH: Final = 200
 """Number of sent frames with which a published message is compared.
 

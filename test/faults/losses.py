@@ -84,4 +84,5 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""Groups of stops. One driver performs all stops of a group, and the last stop ends the driver."""
+"""Groups of stops. One driver performs all stops of a group. The last stop of each group also ends
+the driver."""

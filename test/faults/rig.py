@@ -43,7 +43,7 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 ``GAP_MPS2``: largest acceleration in a gap of data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
-"""Number of published messages of which one may be wrong, if one byte in 100 is lost."""
+"""If one byte in 100 is lost, one of this number of published messages may be wrong."""
 ENDS_WITHIN_S: Final = 2.0
 
 
@@ -168,9 +168,9 @@ class Rig:
             self._terminal, self._unplugged_at_s = None, time.monotonic()
 
     def plug(self) -> None:
-        """Make a new terminal. It has another name, but the same symbolic link.
+        """Make a new terminal, which has another name but the same symbolic link.
 
-        Before that, simulate the board for the time that has passed since ``unplug``.
+        First, simulate the board for the time since ``unplug``.
         """
         if self._unplugged_at_s is not None:
             for _ in range(round((time.monotonic() - self._unplugged_at_s) / TICK_S)):

@@ -2,7 +2,7 @@
 
 """The line from the driver to the board, with its faults.
 
-This module depends on bytes, not on frames.
+This module works on single bytes. It does not know frames.
 """
 
 import math
@@ -26,8 +26,8 @@ class Line(Protocol):
     """The damaged line of one trial.
 
     ``whole``: number of bytes before the next fault. A write of at most this length arrives
-    undamaged. The caller then need not call ``carry``, but subtracts the write's length from
-    ``whole``. For a longer write, the caller must call ``carry``.
+    undamaged. For such a write, the caller need not call ``carry``. It subtracts the write's length
+    from ``whole``. For a longer write, the caller must call ``carry``.
     """
 
     whole: int

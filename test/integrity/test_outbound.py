@@ -36,9 +36,9 @@ class Losing:
 
 
 def on_all_receivers(course: Course, line: Line) -> Score:
-    """Send what the driver writes in ``course`` to each kind of receiver; return the total score.
+    """Send the writes of ``course`` to each kind of receiver; return the total score.
 
-    The line damages these bytes in the same way for each receiver.
+    Each receiver gets its own copy of ``line``, so the same bytes are damaged for each of them.
     """
     total = Score()
     for receiver in RECEIVERS:
@@ -68,8 +68,8 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
     """The results of a short run are within the bounds of the outbound report.
 
-    One script of each scene is run with each kind of receiver. Bounds on rates are not checked,
-    because a short run has too few frames.
+    The run has one script for each scene, and repeats it with each kind of receiver. Bounds on
+    rates are not checked, because a short run has too few frames.
     """
     scores, _ = one(0.025, (scene, 0), LOSSES)
     for fault in LOSSES:
@@ -85,10 +85,10 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The last byte of a motion frame is lost, so the first byte of the next write completes it.
+    """The board obeys a motion frame that has lost its last byte for less than 1.5 ms.
 
-    This byte is a zero, so the frame is wrong. The board obeys it only until the next frame, for
-    less than 1.5 ms.
+    The first byte of the next write completes the frame. This byte is a zero, so the frame is
+    wrong. The board obeys the wrong frame only until it receives the frame of that next write.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
@@ -146,10 +146,11 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """The board acts on three letters. The judge accepts a letter that the driver sent.
+    """The judge distinguishes letters that the driver sent from other letters.
 
-    It reports a byte of a frame as a "false" letter. A letter that the line added is counted as
-    "added".
+    The board acts on three letters. The driver sent the first one, so the judge accepts it. The
+    second is a byte of a frame, so the judge reports a "false" letter. The line added the third, so
+    the judge counts it as "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)

@@ -43,7 +43,7 @@ class Setpoint:
     pose: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def step(self) -> tuple[float, float]:
-        """Advance by one tick. Return the acceleration along the body's x and y, in m/s²."""
+        """Simulate one tick. Return the acceleration along the body's x and y, in m/s²."""
         if not self.driving:
             return 0.0, 0.0
         if self.random.random() < 0.02:

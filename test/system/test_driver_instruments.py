@@ -124,9 +124,10 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 def test_the_bias_is_what_was_set_last(
     start_board: Callable[..., PtyBoard], start_driver: Callable[..., Driver], probe_of: Any
 ) -> None:
-    """The driver has refined the gyro bias at rest. Then the user sets ``gyro_bias``.
+    """The driver uses the gyro bias that was set last.
 
-    The driver uses the user's value, even if the parameter had this value before.
+    The driver has refined the gyro bias at rest. Then the user sets ``gyro_bias``. The driver uses
+    the user's value, also if the parameter already had this value.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
@@ -181,8 +182,8 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     def keeps_pace() -> bool:
         """Return whether the IMU rate is right.
 
-        The test waits for this. After a stall of the computer, the rate is first too low and then
-        too high.
+        After a stall of the computer, the rate is too low for a while, and then too high. So the
+        test waits until this function returns True.
         """
         if (status := robot.status("Stream")) is None:
             return False

@@ -36,9 +36,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_every_way_a_port_can_refuse_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
 ) -> None:
-    """A port cannot be opened. For each error, the message has advice.
+    """For each error that prevents the opening of a port, the message has advice.
 
-    A substitute for pyserial raises the errors, because the kernel does not refuse access to root.
+    In this test, a substitute for pyserial raises the errors. The kernel cannot cause all of them,
+    because it does not refuse access to root.
     """
 
     def refuse(*_: object, **__: object) -> None:
@@ -65,7 +66,8 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
     """A second program opens a port that is in use.
 
-    The error names the process that uses the port. The kernel's list of locks shows this process.
+    The error names the process that uses the port. The driver finds this process in the kernel's
+    list of locks.
     """
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
@@ -107,9 +109,10 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A real terminal is exclusive while its port is open: then only root can open the terminal.
+    """A port makes a real terminal exclusive until the port is closed.
 
-    Programs that use no locks are refused, too. A pseudo-terminal is never made exclusive.
+    While the terminal is exclusive, only root can open it again. This also keeps out programs that
+    use no locks. The port never makes a pseudo-terminal exclusive.
     """
 
     def exclusive() -> bool:
@@ -151,9 +154,10 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 def test_a_write_that_is_taken_in_pieces_is_completed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The kernel accepts a long write only in parts.
+    """The port completes a long write that the kernel accepts only in parts.
 
-    The port completes it while the other end reads. On a busy computer, this end reads slowly.
+    It writes each further part when the other end has read. The test allows a long time for this,
+    because the other end reads slowly on a busy computer.
     """
     monkeypatch.setattr("omnibot_driver.transports.serial_port.WRITE_TIMEOUT_S", PATIENCE_S)
     port = SerialPort(terminal.path, 115200)

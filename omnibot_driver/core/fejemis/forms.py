@@ -24,7 +24,10 @@ Form = tuple[int, ...]
 
 
 class Forms:
-    """The learnt form of each kind of line, by the keyword of the line."""
+    """The learnt forms of lines: one form for each keyword.
+
+    The keyword names the kind of the line.
+    """
 
     def __init__(self) -> None:
         self._kinds: dict[bytes, _Kind] = {}

@@ -118,7 +118,8 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        If its port is unknown, the lines go to each port where this board may be.
+        If the port of this board is not known, the lines go to each port whose board is not
+        identified. If both boards are identified, they go to both ports.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

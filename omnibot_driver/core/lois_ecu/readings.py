@@ -74,7 +74,8 @@ class RecordFailed(Unstamped):
 class TerminalLeft(Unstamped):
     """Notification that a terminal mode has ended.
 
-    The e-stop button may have changed meanwhile. In a terminal mode, its state is not reported.
+    During the mode, the board does not report the e-stop button. So the state of the button may
+    have changed.
     """
 
 

@@ -25,8 +25,8 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    It stops the robot before a sensor's mode, and before the changes passed to ``stop_first``.
-    ``want`` and ``stop_first`` may be called at any time.
+    It stops the robot before a sensor's mode begins. It also stops the robot before each change
+    that was passed to ``stop_first``. ``want`` and ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:
@@ -105,9 +105,9 @@ class ModeChange:
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
         """Return the command to send now, or None. A mode is changed only after a standstill.
 
-        First, Stop is sent until the robot is seen at rest, but for at most ``UNPROVED_S``. Then
-        RPM 0/0 is sent, because the public firmware would count backward duty as forward motion
-        while it keeps a positive RPM target.
+        First, the driver sends Stop until it sees the robot at rest, but for at most
+        ``UNPROVED_S``. Then RPM 0/0 is sent, because the public firmware would count backward duty
+        as forward motion while it keeps a positive RPM target.
 
         ``stands``: whether the robot is seen at rest.
 

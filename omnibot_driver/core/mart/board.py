@@ -86,8 +86,9 @@ class MartBoard(Board):
     def mode(self) -> Mode:
         """The mode of the board.
 
-        The mode becomes nominal when the server has answered the first stop. It stays unknown if
-        the server is lost, or if the reply to HELLO has shown that it is another kind of server.
+        The mode becomes nominal when the server has answered the driver's first stop command. It
+        stays unknown in two cases: the server is lost, or the reply to HELLO has shown that the
+        server is of an unsupported kind.
         """
         return self._mode
 
@@ -200,7 +201,8 @@ class MartBoard(Board):
     def wake(self) -> Packets:
         """Return the commands that stop the robot at the beginning of a connection.
 
-        The ``Pilot`` repeats them until the server answers. Its other requests come after that.
+        The ``Pilot`` repeats these commands until the server answers. It sends other requests only
+        after that.
         """
         return self.stop()
 
@@ -218,7 +220,7 @@ class MartBoard(Board):
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job; a JobDone with this ``token`` reports its result later.
 
-        Raises RequestRefused during another job, or if there may be no log to download.
+        Raises RequestRefused if another job is in progress, or if there may be no log to download.
         """
         self._pilot.jobs.ask(job, token, now, *arguments)
 
@@ -229,7 +231,7 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server reports a heading of exactly zero, as it does until its first RM.
+        """Whether the server reports a heading of exactly zero, because it has not done an RM yet.
 
         RM is the forward drive. After the first RM, the server's clock must not be set back.
         Otherwise the next RM would report a wrong heading, because RM integrates the turn rate over

@@ -23,11 +23,12 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Standard deviations of an unmeasured controlled move, whose distance or turn is estimated.
+"""Standard deviations of the first run of a controlled move that runs twice.
 
-If the network delivers the request twice, the move runs twice, and the first run is not measured.
-``RUN``: error as a part of the estimate. ``END_RUN_M``, ``END_RUN_RAD``: additional errors of a
-distance in m, and of a turn in rad.
+If the network delivers the request twice, the robot makes the move twice. The first run is not
+measured: its distance or turn is only estimated.
+``RUN``: an error that grows with the estimate, as a fraction of the estimate.
+``END_RUN_M``, ``END_RUN_RAD``: additional constant errors, of a distance in m and of a turn in rad.
 """
 
 
@@ -94,10 +95,11 @@ class CorrectedPose:
             self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def lose_turn(self) -> None:
-        """Add the error of an unknown turn, for example after a restart of the server in a motion.
+        """Add the error of a turn of unknown size.
 
-        During a restart, the motors keep their last command, so the robot may turn. Afterwards, the
-        server's relative heading begins at zero, so it does not show this turn.
+        For example, the server restarts in a motion. During the restart, the motors keep their last
+        command, so the robot may turn. After it, the server's relative heading begins at zero, so
+        it does not show this turn.
         """
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
@@ -114,9 +116,9 @@ class CorrectedPose:
         """End a turn on the spot, and return the correction of its angle in rad.
 
         If the angle from the server is plausible, the correction is zero. Otherwise the angle from
-        the encoder count replaces it. There are two possible reasons: the server's angle belongs to
-        another motion, or only one of the wheels has turned. So the whole difference between the
-        two angles is added to the uncertainty.
+        the encoder count replaces it. An implausible angle has one of two reasons: it belongs to
+        another motion, or only one of the wheels has turned. The method cannot know which one, so
+        the whole difference between the two angles is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

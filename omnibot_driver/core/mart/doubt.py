@@ -45,17 +45,17 @@ turns, it is multiplied by the angle in rad.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Ratio of the random to the constant error of a turn that is computed from the commands.
+"""Ratio of two errors of a turn that is computed from the commands: random to constant error.
 
 Both errors are standard deviations. The constant error comes from the assumed wheel speed ratio, so
 it has the same sign in all intervals between two encoder counts. The random errors of different
 intervals are independent.
 """
 ASTRAY: Final = 0.7
-"""Factor for the error of a driven distance that an uncertain heading causes.
+"""Factor for the error of a driven distance. The error comes from an uncertain heading.
 
 The relative error of the distance is this factor times the variance of the heading (rad²), but at
-most 1. There is an error of this size along the motion, and another one across it.
+most 1. An error of this size is assumed along the motion, and a second one across it.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
@@ -131,10 +131,11 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the constant heading error of all computed turns so far, because a motion begins.
+        """Store the constant heading error of the turns that were computed before this motion.
 
-        If the server reports the heading during this motion, ``heading_told`` restores the stored
-        error. The constant error that this motion has added is then removed.
+        Call this when a motion begins. If the server reports the heading during this motion,
+        ``heading_told`` restores the stored error, so the constant error that this motion has added
+        is removed.
         """
         self._bend_before_rad = self._levers[2][2]
 
@@ -173,10 +174,10 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the heading error of the last turn by the error of the recorded angle.
+        """Use the error of the server's recorded angle as the heading error of the last turn.
 
-        The angle that the wheel measured is replaced by the angle that the server has recorded,
-        which comes from the gyro. Call this before the position changes.
+        Until now, the heading error was that of the angle that the wheel measured. The recorded
+        angle comes from the gyro. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

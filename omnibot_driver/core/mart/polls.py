@@ -36,11 +36,9 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 In states that are not listed here, the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between their queries.
-
-If nothing is near, both report the same value. With less time between the queries, a late copy of
-one sonar's reply could be mistaken for the reply of the other sonar.
-"""
+"""The two sonars, and the least time in s between their queries. With less time, a late copy of one
+sonar's reply could be mistaken for the reply of the other sonar. The values would not show this
+mistake, because both sonars report the same value if nothing is near."""
 
 
 class Polls:
@@ -58,8 +56,8 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The query with the smallest sum of due time and period is first. With this order, every
-        query is sent even if exchanges are slow.
+        The most urgent query is the one with the smallest sum of due time and period. With this
+        order, every query is sent even if exchanges are slow.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]
@@ -82,10 +80,10 @@ class Polls:
         self._repeated.discard(word)
 
     def missed(self, word: Word) -> None:
-        """Make a query without an answer due at once.
+        """Make a query due at once, because it had no answer.
 
-        If the repeated query has no answer either, it waits for its turn, so that the other queries
-        are sent.
+        If the repeated query has no answer either, it is due at its usual time. This leaves time
+        for the other queries.
         """
         if word not in self._repeated:
             self._repeated.add(word)
@@ -98,9 +96,9 @@ class Polls:
         self._asked_s.pop(word, None)
 
     def wake_at(self, state: State) -> float:
-        """Return when the next query for encoder or heading is due; infinite without such a query.
+        """Return when the next query for encoder or heading is due; infinite if there is none.
 
-        The less frequent queries are sent at these times too.
+        The other queries are less frequent. They are sent at these times too.
         """
         frequent = (word for word in (ENC, RMRA) if word in PERIODS.get(state, {}))
         return min((self._at(word, state) for word in frequent), default=math.inf)

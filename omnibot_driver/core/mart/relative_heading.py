@@ -22,8 +22,9 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 OLD_RAD: Final = 0.01
 """Largest difference in rad between two headings that are regarded as the same heading.
 
-A forward drive (RM) sets the heading to zero. If the first heading in RM is nearly the last heading
-before RM, it may have been measured before RM, and its reply may be late.
+A forward drive (RM) sets the server's heading to zero. If the first heading that is reported in the
+RM is nearly the last heading before it, the server may have measured this heading before the RM.
+Its reply may be late.
 """
 MOST_RAD: Final = 1e7
 """Size in rad from which a reported heading is rejected.
@@ -60,7 +61,8 @@ class RelativeHeading:
         self._turned_rad = 0.0
         self.same = 0
         self.may_begin_anew = False
-        """Whether the next heading may be zero because the server has restarted."""
+        """Whether the server may have restarted. If so, the next heading may be zero for this
+        reason."""
         self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 
@@ -163,9 +165,10 @@ class RelativeHeading:
             self.rate_radps = (self._turned_rad - then_rad) / max(when.at_s - then_s, CLOCK_S)
 
     def turned_rad(self, at_s: float, *, stands: bool) -> float:
-        """Return the turn since the motion began, predicted to ``at_s``, in rad.
+        """Return the turn from the beginning of the motion until ``at_s``, in rad.
 
-        ``stands``: whether the robot was stopped. If so, nothing is predicted.
+        The turn since the last heading is predicted. ``stands``: whether the robot was stopped. If
+        so, nothing is predicted.
         """
         ahead_s = 0.0 if stands else min(max(0.0, at_s - self.told_s), AHEAD_S)
         return self._turned_rad + self.rate_radps * ahead_s

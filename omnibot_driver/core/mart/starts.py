@@ -98,11 +98,11 @@ class Starts(FailedStarts):
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _switch_motors_off(self, now: float) -> Packets:
-        """Return the next request that switches off the motors, if it may be sent now.
+        """Return the next request that switches off the motors; no packets while it must wait.
 
         The requests are MCS, which writes "stop" to both motors, and MSM, which ends the effect of
-        MCS. Neither is sent while a late reply to another request could be mistaken for its reply.
-        MSM is also not sent while a duplicate of MCS could arrive after it.
+        MCS. A request waits while a late reply to another request could be mistaken for the reply
+        to it. MSM also waits while a duplicate of MCS could arrive after it.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -125,11 +125,12 @@ class Starts(FailedStarts):
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return True if ``start`` is a controlled move and an earlier HELLO may arrive after it.
+        """Return whether a late reply to an earlier HELLO could hide a duplicate of ``start``.
 
-        The server might answer that HELLO just before it executes a duplicate of the move. The
-        driver would then wrongly conclude that there is no duplicate. After a fresh check of the
-        IMU, no earlier HELLO can arrive, because the driver waits before such a check.
+        Only controlled moves are concerned. The server might answer the HELLO just before it
+        executes a duplicate of the move. From this answer, the driver would wrongly conclude that
+        there is no duplicate. After a fresh check of the IMU, this cannot happen: the driver waits
+        before such a check, so no earlier HELLO can arrive after it.
         """
         moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
         return moves and now < self._greeted_s + self._delay_s

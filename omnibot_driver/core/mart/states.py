@@ -129,10 +129,8 @@ LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SL, SS),
 }
-"""For each motion, the commands that the driver sends if the command port stays silent.
-
-They stop the motors by the stop port. They are the last resort, because they may hang the server.
-"""
+"""For each motion, the commands that stop the motors by the stop port. The driver sends them if the
+command port stays silent. They are the last resort, because they may hang the server."""
 
 STARTS: Final[Mapping[Word, Motion]] = {
     RM: Motion.REFERENCE,

@@ -2,8 +2,9 @@
 
 """The distance rolled by the right wheel, from its encoder count.
 
-The count begins at zero in each motion. The third implausible count in a row is accepted. This
-module knows counts and times; it does not know the robot's motion. The caller passes the time.
+The count begins at zero in each motion. Implausible counts are rejected, but the third one in a row
+is accepted. This module knows counts and times; it does not know the robot's motion. The caller
+passes the time.
 """
 
 import math
@@ -15,8 +16,8 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Largest accepted error of a count whose reply may belong to another query.
 
-It is DOUBT_M (m), plus DOUBT_MPS (m/s) times the sum of two times: the driving time since the last
-count, and the time uncertainty of the reply.
+It is DOUBT_M (m) + DOUBT_MPS (m/s) * time. The time is the sum of two times: the driving time since
+the last count, and the time uncertainty of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time."""
@@ -33,7 +34,8 @@ class Step:
 
     ``lost``: whether the robot has also moved by an unknown amount.
 
-    ``unsure``: whether the start command may be lost. If it is, the wheel has not rolled.
+    ``unsure``: whether the start command may be lost. If the command is lost, the wheel has not
+    rolled.
     """
 
     wheel_m: float
@@ -60,7 +62,7 @@ class WheelCount:
         self.certain = False
         self.maybe = 0
         self.may_begin_anew = False
-        """Whether the server may have reset the count to zero since the last reply."""
+        """Whether the server may have reset the count to zero after its last reply."""
         self._raw: int | None = None
         self._before: int | None = None
         self._begins = self._confirmed = self._unseen = False
@@ -95,7 +97,10 @@ class WheelCount:
         return True
 
     def connect(self) -> None:
-        """Begin a new connection; the robot may have moved, or the server may have restarted."""
+        """Begin a new connection.
+
+        Before it, the robot may have moved, or the server may have restarted.
+        """
         self.may_begin_anew = self._unseen = True
 
     def appear(self) -> None:

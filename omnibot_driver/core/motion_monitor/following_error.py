@@ -25,10 +25,11 @@ all these set-points is assumed to be held.
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of the error's limit that one displacement adds. The second value is for
-displacements that last longer than 60 ms, the first for all others.
+"""Largest fraction of the error's limit that one displacement adds.
 
-So the error exceeds its limit only after three displacements in a row, or after two long ones.
+The first value is for displacements of up to 60 ms, the second for longer displacements. With these
+values, the error exceeds its limit only after three displacements in a row, or after two longer
+ones.
 """
 
 

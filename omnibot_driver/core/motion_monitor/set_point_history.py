@@ -26,19 +26,17 @@ HELD_S: Final = 0.3
 This time includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant, in s, of the decay of the velocity that a replaced set-point still allows. The
-decay begins ``HELD_S`` after the replacement.
-
-This value is long enough for robots with a time constant of up to 0.35 s.
-"""
+"""Time constant, in s, of a decay. A replaced set-point allows its full velocity for ``HELD_S``,
+and after that a velocity that decays with this time constant. The value is long enough for robots
+with a time constant of up to 0.35 s."""
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored. By then, it allows less than 2 % of its
 velocity."""
 UNKNOWN_S: Final = 0.8
-"""Time in s after the first known set-point during which earlier, unknown commands may still move
-the robot."""
+"""Time in s for which unknown commands may still move the robot. It begins with the first known
+set-point. The unknown commands are those from before this set-point."""
 HISTORY_S: Final = 3.0
-"""Length of the history in s. A displacement is older than this only if the computer has
+"""Length of the history in s. A displacement can be older than the history only if the computer has
 stalled."""
 
 
@@ -96,7 +94,7 @@ class SetpointHistory:
     def explained(self, at_s: float) -> list[Velocity]:
         """Return the velocities that the robot may have at ``at_s`` because of its set-points.
 
-        The velocity of the current set-point comes first.
+        The first velocity in the list is the one of the current set-point.
         """
         found: list[Velocity] = []
         age_s = 0.0

@@ -34,7 +34,8 @@ class GapInterpolation:
     ) -> tuple[Pose, Pose]:
         """Return two tangents (twist x time) in body axes.
 
-        The first is that of all lost displacements together, the second that of ``reading``.
+        The first tangent is the motion of all lost displacements together. The second is the motion
+        of the displacement ``reading``.
         ``heading_rad``: heading before the losses; None if no pose has arrived. If it is None,
         ``reading`` is assumed to be in body axes.
         """

@@ -36,8 +36,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of a frame that seems to have gained bytes, if another header begins where the frame
-would end without the gained bytes."""
+"""Extra cost of a frame that is assumed to have gained bytes. It applies if another header begins
+where the frame would end without these bytes."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
@@ -68,11 +68,10 @@ BAD_TEXT: Final = 4.0
 """Cost of a complete «Paused» text within unexplained bytes. Its nine fixed bytes hardly arise by
 chance."""
 KNOWN_GAP: Final = 11.0
-"""Cost of a frame whose bytes arrived with a pause between them, if all earlier pauses of the line
-were between frames.
+"""Cost of a frame that contains a pause, on a line that has paused only between frames so far.
 
-On any line, a pause of ``late_reads.IDLE_S`` or longer has this cost. The cost is high, so only
-strong evidence makes the decoder accept a frame with such a pause.
+On any line, a pause of ``late_reads.IDLE_S`` or longer within a frame has this cost. The cost is
+high, so only strong evidence makes the decoder accept such a frame.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -101,8 +100,8 @@ LOOK_ALIKE: Final = 12.0
 Such a frame is probably misread: what looks like its header is a gyro value of -6 of another frame.
 """
 JUMP: Final = 2.5
-"""Cost of a counter that did not advance by one. It is the cost of the explanation that an earlier
-frame was lost."""
+"""Cost of a counter that did not advance by one. Such a counter means that a frame before it was
+lost."""
 IMPOSSIBLE: Final = 2.0
 """Cost of a movement that a robot with this board cannot make."""
 OFF_BEAT: Final = 1.0
@@ -184,7 +183,7 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Limits of an IMU frame's content. Within these limits, the content has no cost.
+        """Limits of an IMU frame's content. Content within all limits has no cost.
 
         In order: the least and the largest squared acceleration, the largest change of an
         acceleration word and of a gyro word. All are integers in counts: integers compare faster.

@@ -34,8 +34,8 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""Least cost of a frame's content at which the frame must wait. The bytes after the frame then
-decide whether it is accepted."""
+"""Cost of content from which on a frame must wait. The decoder accepts the frame, or rejects it,
+when it knows the bytes after the frame."""
 DOUBT_BYTES: Final = 170
 """Largest number of uncertain bytes. When it is reached, the decoder decides on their first half.
 In nominal mode, the board sends this number of bytes in 100 ms."""
@@ -85,7 +85,7 @@ class FrameDecoder:
         self.at_rest = False
         """Whether all received bytes are decoded, and the line normally pauses only between frames.
 
-        If this is true, faster code may decode the next bytes.
+        If this is true, the faster code in ``single_imu`` may decode the next bytes.
         """
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
@@ -179,7 +179,10 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """Accept consecutive frames until a frame is uncertain. In that case, return False."""
+        """Accept consecutive frames until a frame is uncertain.
+
+        Return False if there is such a frame.
+        """
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
@@ -240,9 +243,10 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of ``walk``, but not the last two: the bytes after those are odd.
+        """Accept the frames of ``walk`` except the last two.
 
-        Always return False. ``_walk`` returns this value to report an uncertain frame.
+        The bytes after these two frames are odd, so the two frames are uncertain. Always return
+        False: ``_walk`` returns this value to report an uncertain frame.
         """
         believed = len(walk.frames) - 2
         if believed > 0:

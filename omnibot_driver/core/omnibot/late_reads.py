@@ -33,35 +33,30 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board within a frame."""
 NEAR_S: Final = 2e-3
-"""Tolerance in s when a delay is compared with whole ticks.
-
-If bytes were lost, later frames seem late by a whole number of ticks.
-"""
+"""Tolerance in s for the check whether a delay is a whole number of ticks. Lost bytes make later
+frames seem late by such a delay."""
 INTO_TICK_S: Final = 1e-3
-"""Time in s from the beginning of a tick until the board sends a delta or a pose. First, the board
-sends the IMU frame of the tick."""
+"""Time in s from the beginning of a tick until the board sends a delta or a pose. In this time, the
+board sends the IMU frame of the tick."""
 PUNCTUAL_S: Final = 1e-3
 """The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Tolerance in s for the comparison of two times: the time in which bytes arrived, and the time
-that the line needs to send them.
+"""Tolerance in s for the check whether bytes arrived as fast as the line sends them.
 
-If the two times differ by less than this tolerance, the bytes arrived as fast as the line sends
-them. So they did not wait for the reader.
+The check compares the time in which the bytes arrived with the time that the line needs to send
+them. If the two times differ by less than this tolerance, the bytes did not wait for the reader.
 """
 FEW_BYTES: Final = 2
-"""How fast bytes arrive can be measured only if there are more bytes than this number."""
+"""Largest number of bytes that is too small to measure how fast the bytes arrive."""
 TICKS_TO_PROVE: Final = 2
-"""Number of further late ticks, after a first late tick, that prove that bytes were lost.
+"""If this number of further late ticks follows a first late tick, bytes were lost.
 
 Each further tick must be in a separate read, and must be as late as the first late tick. After a
 pause of ``IDLE_S`` or more, one further tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Number of bytes after a frame within which the cause of a pause in the frame must be found.
-
-If these bytes do not prove that the line was idle, the reader is assumed to have been late.
-"""
+"""Largest number of bytes after a frame that are searched for the cause of a pause in this frame.
+If these bytes do not prove that the line was idle, a late reader is assumed to be the cause."""
 
 
 class Cause(Enum):
@@ -92,7 +87,8 @@ class Gap(NamedTuple):
 
     * ``first``, ``before``: the place of the pause among the bytes held. The pause is directly
       before one of the bytes at the positions ``first`` to ``before`` - 1.
-    * ``price``: cost of the assumption that a frame contains the pause, if the line was idle.
+    * ``price``: cost of an interpretation in which the line was idle and a frame contains the
+      pause.
     * ``pause_s``: time in s between the two reads.
     """
 
@@ -169,10 +165,11 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause within a frame. The frame after it shows the cause.
+    """Return the cause of a pause within a frame, as far as the next frame shows it.
 
-    The line was idle if that frame also contains a pause, and the two pauses end a whole number of
-    ticks apart. ``start``: position of that frame. ``first``: the read that ended the first pause.
+    The line was idle if the next frame also contains a pause, and if the two pauses end a whole
+    number of ticks apart. ``start``: position of the next frame. ``first``: the read that ended the
+    pause in the first of the two frames.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

@@ -142,8 +142,9 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        To draw again, Textual starts a new thread that reads keys. The old thread survives SIGSTOP
-        and would read keys, too. So ``suspend`` ends the old thread before that.
+        To draw again, Textual starts a new thread that reads keys. The old thread has survived
+        SIGSTOP and would read keys, too. So ``suspend`` ends the old thread before the new one
+        starts.
         """
         with self.suspend():
             pass

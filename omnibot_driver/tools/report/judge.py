@@ -59,7 +59,8 @@ def _all(log: Log) -> Iterator[Finding]:
 def _has_no_imu(log: Log) -> bool:
     """Return whether the diagnostics show that the board has no IMU.
 
-    If the board has an IMU, the driver's Stream status counts its frames.
+    For a board with an IMU, the driver's Stream status counts IMU frames. The board has no IMU if
+    there is a Stream status without such a count.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     return bool(streams) and not any("IMU" in key for item in streams for key in item.values)

@@ -21,9 +21,10 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The e-stop is latched while the robot drives. The robot stops, and commands are refused.
+    """The driver sends the e-stop at once, and then refuses commands.
 
-    The driver then sends only ES (the board's own emergency stop) and Stop, always together.
+    The e-stop is latched while the robot drives. The robot stops. While the e-stop is latched, the
+    driver sends only pairs of ES (the board's own emergency stop) and Stop.
     """
     bench.drive(0.5)
     bench.run(0.1)

@@ -85,9 +85,9 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The board's heading counts full turns, and may begin several turns away from zero.
+    """The robot turns to a goal by less than half a turn, also after several full turns.
 
-    The driver converts a goal so that the robot turns by less than half a turn.
+    The board's heading includes the full turns. The driver adds them to the heading of a goal.
     """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
@@ -123,9 +123,10 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """The driver is set to position control and refuses velocities.
+    """The driver refuses velocities while it is set to position control.
 
-    The board would interpret a velocity of 0.3 m/s as a goal 21 mm from the origin.
+    With this setting, the board takes each command for a goal. It would interpret a velocity of 0.3
+    m/s as a goal 21 mm from the origin.
     """
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
@@ -150,9 +151,10 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """The board's pose is not known, or not used. Goals are refused.
+    """The driver refuses goals while the board's pose is not known, or not used.
 
-    Without this pose, a goal in the odometry frame cannot be converted to the board's frame.
+    Without this pose, the driver cannot convert a goal from the odometry frame to the board's
+    frame.
     """
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
@@ -277,9 +279,9 @@ def test_a_new_scale_of_odom_discards_a_goal(bench: Bench, scale: str) -> None:
 def test_a_robot_that_drives_away_from_its_goal_is_stopped(
     goal: tuple[float, float, float],
 ) -> None:
-    """The driver sends a goal, but the board's switch is set to velocity control.
+    """A robot that drives away from its goal is stopped, and a notice names the board's switch.
 
-    The board takes the goal for a velocity. The driver stops the robot and names the switch.
+    The switch is set to velocity control, so the board takes the goal for a velocity.
     """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the angle of the front wheel: its relay, its age and a broken sensor."""
+"""Tests of the angle of the front wheel: how it is relayed, when it is too old, a broken sensor."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, drive_until_refused, nominal
@@ -98,10 +98,10 @@ def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
 
 
 def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
-    """The front board falls silent, and at first the driver reads late.
+    """A late read does not hide that the front board is silent.
 
-    While the driver reads late, the refusal of a command names the computer. When the driver reads
-    in time again, the refusal names the front board.
+    The front board falls silent while the driver reads late. The refusal of a command then names
+    the computer. As soon as the driver reads in time again, the refusal names the front board.
     """
     bench = nominal()
     bench.run(0.1)

@@ -46,7 +46,7 @@ GOLDEN_SUMS = [
     b";31leave",
     b";06hbt 44.97199 90 110 24.95 10 0",
 ]
-"""Example lines with their checksums, as public host programs write them."""
+"""Example lines with checksums, in the form in which public host programs write them."""
 GOLDEN: dict[str, Message] = {
     "hbt 44.97199 90 110 24.95 10 0": Heartbeat(44.97199, 90, 110, 24.95, 10.0),
     "hbt 45.1 90 110 24.95 -1 0": Heartbeat(45.1, 90, 110, 24.95, -1.0),
@@ -179,9 +179,9 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line has lost its end, so the next line is joined to it and both are discarded.
+    """A line with a wrong checksum is counted, and costs no later line.
 
-    No later line is discarded.
+    A line has lost its end, so the next line is joined to it. Both are discarded.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
@@ -262,7 +262,8 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
     """The first heartbeat shows whether the board's lines have checksums.
 
-    Afterwards, lines that differ from the heartbeat in this respect are discarded.
+    If it has a checksum, the decoder then discards lines without one. If it has none, the decoder
+    discards lines with one.
     """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
@@ -313,10 +314,11 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Lines of one kind begin to arrive with fewer decimals than before.
+    """The decoder soon accepts lines that the firmware prints with other decimals than before.
 
-    The first two are discarded as damaged. From the third on, they are accepted. If the decimals of
-    a kind of line vary all the time, lines of this kind are accepted with any number of decimals.
+    Lines of one kind begin to arrive with fewer decimals. The decoder discards the first two as
+    damaged, and accepts the third and all later ones. If the decimals of a kind of line vary all
+    the time, the decoder accepts lines of this kind with any number of decimals.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")

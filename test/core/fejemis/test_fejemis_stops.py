@@ -19,9 +19,10 @@ def without_relays(lines: list[str]) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """An e-stop stops both boards. At its release, ``start`` is sent to the drive board only.
+    """An e-stop stops both boards, but its release sends ``start`` to the drive board only.
 
-    A Stop precedes ``start``, because some firmware resumes the old motion command after ``start``.
+    The driver sends Stop before ``start``, because some firmware resumes the old motion command
+    after ``start``.
     """
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
@@ -80,9 +81,9 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 @pytest.mark.slow
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The user requests a pause. The command source -1 in a heartbeat (rcSource) proves it.
+    """A pause is proved when a heartbeat contains the command source -1 (rcSource).
 
-    Latching and releasing the e-stop does not end the pause.
+    Then the e-stop is latched and released. This does not end the pause.
     """
     bench = nominal()
     bench.drive_on()
@@ -126,7 +127,7 @@ def test_a_pause_survives_a_reconnect_and_the_release_of_an_estop() -> None:
 def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
     """The board is stopped when the driver connects.
 
-    The driver starts it if ``auto_start`` is set.
+    The driver starts it if ``auto_start`` is set. Otherwise it leaves the board stopped.
     """
     for run in (True, False):
         bench = Bench(run=run)

@@ -37,10 +37,10 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 
 def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
-    """With the board's own gains, the right wheel stops. The board still reports a speed for it.
+    """The covariance fits the error of the pose, also with the gains that the board boots with.
 
-    The covariance fits the error of the pose. The median of four drives is checked, because a few
-    drives have a larger error.
+    With these gains, the right wheel stops, and the board still reports a speed for it. The median
+    of four drives is checked, because a few drives have a larger error.
     """
     ours = LoisEcuSettings()
     names = {1000: "place right", 1003: "straight back", 1004: "curve back", 1001: "place right"}
@@ -72,10 +72,11 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 
 
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
-    """The driver reads once in 0.05 to 0.35 s, so one read contains reports of ticks and odometry.
+    """A busy computer reads several reports at once, and the driver uses all of them.
 
-    Nevertheless, the driver detects each wheel that stops. If it did not, the position would be
-    wrong by 4 m.
+    The driver reads only once in 0.05 to 0.35 s, so one read contains several reports. From these
+    reports, the driver detects each wheel that stops. If it did not, the position would be wrong by
+    4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -83,10 +84,12 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 
 
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
-    """In a turn, the wheel that turns backward stops, and the driver detects this.
+    """The driver does not assume that a resting wheel rolls because the board's heading is wrong.
 
-    The board still computes its heading from the wheel's old speed, so this heading is far from the
-    true one. The driver does not conclude from this heading that the wheel rolls.
+    In a turn, the wheel that turns backward stops, and the driver detects this. The board still
+    computes its heading from the old speed of this wheel, so the board's heading is far from the
+    true one. The driver does not take the difference of the headings for a sign that the wheel
+    rolls.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)
@@ -97,9 +100,10 @@ def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differ
 def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_computer(
     seed: int,
 ) -> None:
-    """The driver reads once in 0.05 to 0.35 s, so it detects late what the wheels do.
+    """The covariance after a turn in place includes the heading error that a busy computer causes.
 
-    The heading is then wrong by up to 30°. The covariance includes this error.
+    The driver reads only once in 0.05 to 0.35 s, so it detects late what the wheels do. This makes
+    the heading wrong by up to 30°.
     """
     one = motion(wrong("firmware", seed), "place left", HOST_GAINS, reads_s=LATE_READS_S)
     assert one.sigmas < 4.0
@@ -107,9 +111,9 @@ def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_compute
 
 @pytest.mark.parametrize(("name", "seed"), [("straight back", 9025), ("curve back", 9013)])
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """The robot drives backward with the user's gains. Wheels overshoot or roll too fast.
+    """After a backward drive with the user's gains, the position is right within 10 %.
 
-    The position is still right within 10 % of the distance.
+    The error is below 10 % of the distance, although wheels overshoot or roll too fast.
     """
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
@@ -117,10 +121,10 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> None:
-    """The robot drives backward. A large feed-forward makes its wheels twice as fast as commanded.
+    """The odometry follows wheels that roll backward at twice the commanded speed.
 
-    The public firmware counts no ticks backward, but the board's odometry (0x20) shows the speed.
-    The distance is right within 3 %.
+    A large feed-forward causes this speed. The public firmware counts no ticks backward, but the
+    board's odometry (0x20) shows the speed. So the distance is right within 3 %.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", 2), motors=motors), "reverse", HOST_GAINS)
@@ -130,10 +134,11 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> N
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM, some ticks follow the previous tick so soon that the firmware measures no speed.
+    """Above 50 RPM, the board's own heading (0x20) leads to a larger yaw variance.
 
-    The heading in the board's odometry (0x20) is then less accurate, so the filter adds variance to
-    the yaw. At 32 RPM, it adds none.
+    At 62 RPM, some ticks follow the previous tick so soon that the firmware measures no speed. This
+    makes the board's heading less accurate, so the odometry filter adds variance to the yaw. At 32
+    RPM, it adds none.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

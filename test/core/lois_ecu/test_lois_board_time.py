@@ -13,10 +13,9 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
 @pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
 def test_a_read_that_is_late_is_told(lost: float) -> None:
-    """One read is 40 ms late.
+    """If a read is 40 ms late, its estimated delay is 40 ms.
 
-    The estimated delay of this read is 40 ms. This is also true if the board's clock stops while
-    the board sends.
+    This is also true if the board's clock stops whenever the board sends.
     """
     board = BoardTime()
     found = []
@@ -72,9 +71,9 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """The host stalls, and twenty tick reports come in one read.
+    """After a stall of the host, the estimated delays are soon right again.
 
-    After the stall, the estimated delays are right.
+    The host stalls, and then one read takes twenty tick reports at once.
     """
     board = BoardTime()
     found = []
@@ -111,10 +110,11 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """All reads are in time. Then the board's clock jumps by 0.05 s or 0.2 s, ahead or back.
+    """A jump of the board's clock makes the delay of the next tick report irregular.
 
-    The estimated delay of the next tick report changes by the amount of the jump, and is regarded
-    as irregular. Without the jump, the delay is not irregular.
+    All reads are in time. The board's clock jumps by 0.05 s or 0.2 s, ahead or back. The estimated
+    delay of the next report changes by the same amount. Without the jump, the delay would not be
+    irregular.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -126,9 +126,10 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 
 
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
-    """Reads are up to 0.1 s late at random, so a further read that is 0.1 s late is not irregular.
+    """If reads are often late, one more late read is not irregular.
 
-    A read that seems early is irregular, because no read can be early.
+    Reads are up to 0.1 s late at random. A read that is 0.1 s late is then not irregular. A read
+    that seems early is always irregular, because no read can be early.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

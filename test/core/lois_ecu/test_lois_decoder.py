@@ -107,8 +107,8 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
     """The decoder drops a group in which one line is damaged, and returns the next group.
 
-    Exception: if only the last line of a group comes twice, the decoder returns the group. The
-    exception does not apply to a GPS fix.
+    There is one exception: if only the last line of a group arrives twice, the decoder returns the
+    group. A GPS fix is dropped in this case too.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -152,9 +152,10 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """The board sends ticks and then odometry, both with the same command byte. A line is lost.
+    """If a line of two reports is lost, the report that is still complete is decoded.
 
-    The report that is still complete is decoded.
+    The two reports are ticks, and odometry after them. The board sends both with the same command
+    byte.
     """
     decoder = LoisDecoder()
     found: list[Report] = []
@@ -216,10 +217,10 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The tick counts of one report jump, so the decoder discards the report.
+    """Tick counts that jump are dropped, except if the next report continues from them.
 
-    If the next report continues from the new counts, the board has restarted. The decoder then
-    returns the next report.
+    The decoder discards a report whose tick counts jump. If the next report continues from the new
+    counts, the board has restarted, so the decoder returns this next report.
     """
     decoder = LoisDecoder()
     said = [
@@ -250,9 +251,9 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """A valid line has an unknown kind or a value out of range.
+    """The decoder counts a valid line that it cannot use, and returns no report for it.
 
-    The decoder counts the line, and returns no report for it.
+    The kind of this line is unknown, or a value in it is out of range.
     """
     total = 0
     for character in line[:11]:

@@ -36,7 +36,7 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
-    """The unit of the times in a record is unknown. The cells of times and speeds are empty.
+    """If the unit of the times in a record is unknown, the cells of times and speeds are empty.
 
     A remark for the log explains why.
     """

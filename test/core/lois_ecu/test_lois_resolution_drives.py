@@ -50,10 +50,10 @@ def restarts(bench: Bench) -> int:
 def test_a_robot_with_such_encoders_drives_out_and_back(
     firmware: str, per_turn: int, mode: Literal["rpm", "duty"], speed_mps: float
 ) -> None:
-    """The robot drives out and back. The odometry is right within 0.1 m or 3 sigma.
+    """The odometry of a robot with few or many encoder ticks is right after a drive out and back.
 
-    No report is rejected, and no restart is assumed. Then the board restarts, and the driver
-    notices it.
+    It is right within 0.1 m or 3 sigma. The driver rejects no report, and assumes no restart. Then
+    the board really restarts, and the driver notices it.
     """
     settings = LoisEcuSettings(ticks_per_revolution=per_turn, drive_mode=mode)
     bench = Bench(firmware, settings, steps=per_turn)
@@ -102,9 +102,9 @@ def test_a_new_resolution_applies_while_the_driver_runs() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("per_turn", "wrapped_for_s"), [(25, 0.15), (1000, -0.25)])
 def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: float) -> None:
-    """The board's clock in ns is near zero because it wraps, and the board restarts at that time.
+    """The driver notices a restart of the board, although the board's clock wraps at that time.
 
-    The driver notices the restart.
+    The clock counts ns. Just after a wrap its value is near zero, as it is after a restart.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, wrapped_for_s)
@@ -132,7 +132,7 @@ def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None
 
 
 def begin_drive(bench: Bench, wrapped_for_s: float) -> None:
-    """Drive for 2.4 s. The board's clock wraps ``wrapped_for_s`` before the drive ends."""
+    """Drive for 2.4 s. At the end, the last wrap of the board's clock is ``wrapped_for_s`` ago."""
     wraps_s = 2**32 / 1e9
     bench.run((wrapped_for_s - bench.board.now_s - 2.4) % wraps_s)
     bench.drive_on(0.3, 2.4)

@@ -219,10 +219,10 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 
 
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
-    """In compass mode, the public firmware reads only 480 characters a second.
+    """While the e-stop is latched, the driver does not overload a board in compass mode.
 
-    The driver must not send more, so it sends only Stop while the e-stop is latched. Lines that it
-    sends afterwards still arrive.
+    In this mode, the public firmware reads only 480 characters a second, so the driver sends only
+    Stop. Lines that it sends later still arrive.
     """
     bench = Bench("firmware")
     configure(bench, COMPASS)
@@ -237,7 +237,10 @@ def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass()
 
 
 def test_a_terminal_mode_ends_a_record() -> None:
-    """A terminal mode begins during a record. The record is abandoned, because it cannot arrive."""
+    """A terminal mode that begins during a record ends this record.
+
+    The driver abandons the record, because it cannot arrive in a terminal mode.
+    """
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -275,10 +278,10 @@ def test_a_terminal_mode_refuses_a_reset_at_once(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
-    """The drive mode changes during a record, so the driver gives the record up.
+    """The driver drops a record that it has given up, when the record arrives later.
 
-    The board completes this record later. The driver drops it, and takes its lines as a sign that
-    the board is connected.
+    The drive mode changes during the record, so the driver gives the record up. The board completes
+    the record and sends it. Its lines still show the driver that the board is connected.
     """
     bench = Bench("firmware")
     bench.record(RecordKind.TORQUE, 60)
@@ -302,11 +305,11 @@ def refusal(bench: Bench, vx: float = 0.3) -> str:
 @pytest.mark.slow
 @FIRMWARE
 def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: str) -> None:
-    """The user sets a terminal mode during a drive, and later ends it.
+    """The driver gives each reason for a refusal only while this reason is true.
 
-    Motion is refused for three reasons, one after the other. Until the mode is written, the mode is
-    changing. After that, the board is in the mode. At the end, the board has not left the mode yet.
-    The driver gives each reason only while it is true.
+    The user sets a terminal mode during a drive, and later ends it. Until the mode is written, the
+    reason is that the mode is changing. While the board is in the mode, the reason is the mode.
+    After the user has ended the mode, the reason is that the board has not left it yet.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -335,11 +338,11 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """Motion is refused in two situations because the terminal mode is still changing.
+    """Until the board is in the new terminal mode, refusals say that the mode is changing.
 
-    In the first, the robot is at rest, but the driver must write its settings before the mode. In
-    the second, the driver has written the mode, but messages of the normal mode arrive. They show
-    that the board is not in the terminal mode.
+    There are two situations. In the first, the robot is at rest, but the driver must write its
+    settings before the mode. In the second, the driver has written the mode, but messages of the
+    normal mode still arrive.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)
@@ -372,11 +375,12 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
-    """The user changes the drive mode, sets a terminal mode, and takes the terminal mode back.
+    """A terminal mode that is taken back does not end the stop for a new drive mode.
 
-    A new drive mode begins only when the robot has been stopped. So the driver still stops the
-    robot. Until the new drive mode begins, the reason for refusals names the drive mode, and no
-    longer the terminal mode.
+    The user changes the drive mode, sets a terminal mode, and takes the terminal mode back. The new
+    drive mode can begin only when the robot has been stopped, so the driver still stops the robot.
+    Until the new drive mode begins, refusals name the drive mode. They no longer name the terminal
+    mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

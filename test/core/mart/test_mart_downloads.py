@@ -95,7 +95,10 @@ def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
 
 
 def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file of two whole pieces is downloaded whole, although an empty datagram comes between."""
+    """An empty datagram between two pieces of a file does not spoil the download.
+
+    The file has two pieces of full size (512 bytes).
+    """
     content = bytes(range(256)) * 2 + bytes(reversed(range(256))) * 2
     monkeypatch.setattr(FileNote, "content", content)
     bench = MartBench().ready()
@@ -116,9 +119,10 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A zero command cancels the download of the log, after the driver has sent EXIT.
+    """If a stop cancels the download of the log, the result says that the server has ended.
 
-    EXIT ends the server. Therefore the job's result asks the user to copy the file from the
+    The driver has already sent EXIT, which ends the server. Then a zero command cancels the
+    download. Now the driver cannot get the file, so the result asks the user to copy it from the
     controller.
     """
     bench = MartBench().ready()
@@ -167,10 +171,10 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
-    """A server is restarted and has lost its log. The driver refuses the download of the log.
+    """The driver refuses to download the log of a server that was restarted.
 
-    To download a log, the driver must send EXIT. Here, EXIT would end the server without writing a
-    log file.
+    The restarted server has lost its log. To download a log, the driver must send EXIT, which ends
+    the server. After a restart, the server would end without writing a log file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -182,10 +186,11 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 
 
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
-    """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
+    """The log can still be downloaded after the reply to a stop was lost.
 
-    A restart would lose the log. But the heading is not zero, so the server was not restarted, and
-    the log can still be downloaded.
+    The driver repeats the stop, and the server replies that there is no motion. A restarted server
+    would reply the same, and it would have lost its log. But it would also report a heading of
+    zero. This server does not, so the driver knows that it was not restarted.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -243,10 +248,11 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 
 
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
-    """A gyro calibration ends with ``ok``. The request that starts the log is lost.
+    """The driver does not mistake a copy of an earlier ``ok`` for the reply to LOG.
 
-    A copy of the ``ok`` arrives. The driver does not take it for the reply to LOG. So it later
-    refuses to download a log, which would end the server.
+    A gyro calibration ends with ``ok``. Then the request LOG, which starts the log, is lost, and a
+    copy of the ``ok`` arrives. The driver still knows that no log was started. So it later refuses
+    to download a log: the download would end the server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success

@@ -34,10 +34,9 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    The coordinates of a pose must be at most 1e7, in mm or mrad.
-
-    An acceleration word of -6 has the same bytes as a header. An IMU frame with such a word must
-    have an acceleration of at least 0.5 g.
+    It sends no pose with a coordinate above 1e7, in mm or mrad. It sends no IMU frame that has both
+    an acceleration below 0.5 g and an acceleration word of -6. A word of -6 has the same bytes as a
+    header.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

@@ -133,9 +133,9 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """The IMU frame of a knock arrives in two parts, and then the line is silent.
+    """The IMU frame of a knock is returned, although the line is silent right after it.
 
-    The decoder returns the frame.
+    A knock is a short shock. The frame arrives in two parts.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
@@ -145,9 +145,10 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """A frame is doubtful, because its last byte may begin a header.
+    """A doubtful frame is returned as soon as the first byte of the next frame arrives.
 
-    It is returned with the first byte of the next frame, before that frame is complete.
+    The frame is doubtful, because its last byte may begin a header. The decoder does not wait until
+    the next frame is complete.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
@@ -157,10 +158,11 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """An IMU frame ends with FF FB or FF FC, which could also be the header of the next frame.
+    """If pauses show the ticks, an IMU frame waits only in ticks in which a delta is due.
 
-    The pauses between ticks (10 ms) show which frames are due. So the IMU frame waits only in ticks
-    in which a delta is due.
+    The frame ends with FF FB or FF FC, which could also be the header of the next frame. The pauses
+    between the ticks (10 ms) tell the decoder in which ticks a delta is due. In all other ticks,
+    the decoder returns the IMU frame at once.
     """
     made, waited = FrameDecoder(), []
     for tick in range(60):

@@ -20,9 +20,11 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """All frames are lost for more than 1 s. Later displacements wait for a pose of the board.
+    """The first pose that the driver publishes after a long gap is right.
 
-    They wait for up to 0.2 s. Therefore the first pose that the driver publishes is right.
+    All frames are lost for more than 1 s. After the gap, the driver holds displacements back until
+    the board's next pose arrives, but for at most 0.2 s. So it can correct the first pose before it
+    publishes it.
     """
     for seed in range(5):
         on = line(seed)
@@ -39,9 +41,9 @@ def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -
 
 
 def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
-    """After a long gap, the next pose is lost too.
+    """After a long gap, the driver waits only about 0.25 s for the next pose.
 
-    The driver waits about 0.25 s, then interpolates.
+    Here, this pose is lost too. After the wait, the driver interpolates the motion in the gap.
     """
     on = line(1)
     lose(on, 2.0)
@@ -83,9 +85,10 @@ def test_a_long_gap_that_ends_with_a_pose_is_not_bridged(gap_s: float, frame: st
 @pytest.mark.slow
 @pytest.mark.parametrize("gap_s", [3, 8])
 def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: int) -> None:
-    """The robot moves in a long gap, and then stops. Some poses arrive before the next delta.
+    """Motion in a long gap is not lost if poses arrive before the next delta.
 
-    The first of these poses shows the motion, so odom is right.
+    The robot moves in the gap, and then stops. The first pose after the gap shows the motion, so
+    odom is right.
     """
     for seed in range(3):
         on = line(seed)
@@ -98,10 +101,10 @@ def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: in
 
 
 def test_a_pose_that_does_not_correct_continues_the_motion_for_two_seconds_at_most() -> None:
-    """The robot drives at 0.25 m/s. ``use_board_pose`` is off, so poses do not correct odom.
+    """If poses do not correct odom, odom continues the motion in a long gap for only 2 s.
 
-    A pose arrives after a gap of 600 deltas, that is 24 s. Odom continues the motion for only 2 s
-    of the gap, that is 0.5 m.
+    The robot drives at 0.25 m/s, and ``use_board_pose`` is off. A pose arrives after a gap of 600
+    deltas, that is 24 s. In the gap, odom continues for 2 s, that is 0.5 m.
     """
     odometry = attached(OdometrySettings(use_board_pose=False))
     step = DisplacementReading(0.01, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -63,9 +63,9 @@ def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
 
 
 def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
-    """The first start of the log (LOG) deletes earlier files, so a download of them fails.
+    """The first start of the log (LOG) deletes earlier files, and a second LOG deletes nothing.
 
-    A second LOG deletes nothing.
+    After the first LOG, a download of an earlier file fails.
     """
     rig = Rig()
     rig.ask("TF 5")
