@@ -20,20 +20,19 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, in a series of late messages. After a longer pause, a late message begins
-a new series. If a series lasts 5 s (``HEALS_AFTER_S``), the sender's clock was probably set back.
-"""
+"""Longest pause, in s, between two late messages of one series. If a series lasts 5 s
+(``HEALS_AFTER_S``), the sender's clock was probably set back."""
 LARGEST_DRIFT: Final = 5e-4
-"""Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
-rate."""
+"""Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
+corrects a clock."""
 CLOCK_RETREATS: Final = 10.0
 """Factor for the misfit of a message that is too early for a sender (``_Sender.misfit_s``). With
 this factor, a message that is 1 s too early fits as badly as a message that is 10 s too late. A
 message is assigned to the sender that it fits best."""
 ALIKE_S: Final = 0.02
 """Two senders fit a message equally well if their misfits (``_Sender.misfit_s``) differ by at most
-this time, in s. The message is then assigned to the sender whose last message had the higher
-number."""
+this time, in s. In this case, the message is assigned to the sender whose last message had the
+higher number."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender's clock is regarded as known. If there are
@@ -101,7 +100,7 @@ class Transit:
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
         """Return the delay of this message.
 
-        A message is late if its delay is above ``longest_s``. The first message of a sender is
+        ``longest_s``: a message with a longer delay is late. The first message of a sender is
         assumed to have no delay in transit.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
@@ -184,7 +183,8 @@ class _Sender:
 class _Offset:
     """The offset of one of our two clocks from a sender's clock.
 
-    It is the smallest difference so far between arrival (our clock) and sending (sender's clock).
+    The offset is the smallest difference so far. A difference is the arrival by our clock minus the
+    sending by the sender's clock.
     """
 
     def __init__(self, difference_s: float, at_s: float) -> None:

@@ -28,10 +28,8 @@ LATCHED_WORDS = b"and these under the e-stop"
 
 
 EARLY_S = -1000.0
-"""Time of a simulated heartbeat, in s. It is earlier than any time of the real clock.
-
-The real clock begins near 0 at boot, so its time is never negative.
-"""
+"""Time of a simulated heartbeat, in s. It is negative, so it is earlier than any time of the real
+clock, which begins near 0 at boot."""
 
 
 class Line:

@@ -60,9 +60,9 @@ def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """The driver's heartbeats stop, so the guard process writes stop bytes to the board.
+    """If the driver's heartbeats stop, the guard process writes stop bytes to the board.
 
-    When heartbeats arrive again, the guard stops writing and waits.
+    When heartbeats arrive again, the guard process stops writing, and waits.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
@@ -109,9 +109,10 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 def test_the_last_packets_of_an_orderly_end_are_not_discarded(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The driver writes its last packets, such as a pause, and ends without a proof of a stop.
+    """When the driver ends without a proof of a stop, the guard does not discard its last packets.
 
-    These packets may still wait in the kernel, so the guard repeats Stop without discarding them.
+    These packets, such as a pause, may still wait in the kernel. So the guard repeats Stop without
+    discarding them.
     """
     reading, writing = os.pipe()
     process = SimpleNamespace(stdin=os.fdopen(writing, "wb", 0), wait=lambda _within_s: 0)
@@ -154,7 +155,8 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
     """The guard process ignores signals that usually end a process.
 
-    It has its own session, so ctrl-C in the driver's terminal does not reach it.
+    Ctrl-C in the driver's terminal does not even reach it, because the guard process has its own
+    session.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
@@ -253,7 +255,10 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """The driver replaces the stop bytes just before it ends. Its guard writes the newest ones."""
+    """The guard writes the newest stop bytes.
+
+    The driver replaces the stop bytes several times, and then ends.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
@@ -263,10 +268,10 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """Heartbeats and stop bytes come through one pipe. The guard process distinguishes them.
+    """The guard process distinguishes heartbeats from stop bytes in one pipe, wherever a read ends.
 
-    It does so wherever a read ends. An ``e`` outside the stop bytes is a heartbeat with a latched
-    e-stop. An ``e`` within the stop bytes is a part of them.
+    An ``e`` outside the stop bytes is a heartbeat with a latched e-stop. An ``e`` within the stop
+    bytes is a part of them.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

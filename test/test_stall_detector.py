@@ -3,8 +3,8 @@
 """Tests of the stall detector.
 
 The stall detector finds stalls of the pacer, which is the thread that repeats commands. It also
-tells which commands may have waited during a stall: ``outlived_by`` returns False for them. The
-tests call such a command *refused*.
+tells which commands may have waited during a stall: for these commands, its method ``outlived_by``
+returns False. The tests call such a command *refused*.
 """
 
 import pytest
@@ -88,9 +88,10 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """A command seems to come from a stall that ended 98 s ago. The command is not refused.
+    """A command is not refused because of a stall that ended long ago.
 
-    A command cannot be in transit for that time, so the sender's clock must be wrong.
+    The command seems to come from a stall that ended 98 s ago. A command cannot be in transit for
+    that time, so the sender's clock must be wrong.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
@@ -100,9 +101,9 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """The driver's process stalls just after a command was sent, and receives it late.
+    """A command that was sent just before a stall is refused, because it waited during the stall.
 
-    The command is refused.
+    The driver's process receives the command only after the stall.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))

@@ -123,7 +123,7 @@ class Reporter:
         self.notify(self._notices.unconfirmed(self._board.mode, measured=measured, blind=blind))
 
     def set_to_zero(self, *, sideways: bool, planar: bool) -> None:
-        """Report which parts of a body velocity were set to zero, each part only once.
+        """Report which parts of a body velocity the driver has set to zero, each part only once.
 
         ``planar``: False if there was motion out of the plane.
         """

@@ -40,7 +40,8 @@ class Session:
 
     * ``run``: whether to start the board whenever it is connected.
     * ``axis_signs``: for x, y, yaw: -1 if the board's axis is opposite to REP-103's.
-    * ``control``: control method that a switch on the board selects; None without such a switch.
+    * ``control``: control method (velocity or position) that a switch on the board selects; None if
+      the board has no such switch.
     * ``obeys``: False if the session replays a recording, which cannot follow commands.
     """
 
@@ -142,7 +143,8 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin a connection, because the port is open now.
 
-        ``missing``: which ports are not open, as a sentence. If not empty, the robot is not driven.
+        ``missing``: which ports are not open, as a sentence. If it is not empty, the driver does
+        not drive the robot.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -190,10 +192,11 @@ class Session:
     def command_twist(
         self, twist: BodyTwist, now: float, *, age_s: float = 0.0, planar: bool = True
     ) -> None:
-        """Command a body velocity. After CommandRefused, the earlier command stays in effect.
+        """Command a body velocity.
 
-        ``age_s``: age of the sender's stamp in s. ``planar``: False if the sender also asked for
-        motion out of the plane.
+        If this method raises CommandRefused, the earlier command stays in effect. ``age_s``: age of
+        the sender's stamp in s. ``planar``: False if the sender's command also contained motion out
+        of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
         sideways = self._commanding.shaper.sideways
@@ -247,10 +250,10 @@ class Session:
         self._calibration.measure(token, now)
 
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task that takes the board a long time. A RequestDone answers within ``limit_s``.
+        """Begin a task that takes the board a long time.
 
-        ``name``: noun in messages, e.g. "recording". Raises RequestRefused if no task can begin
-        now.
+        A RequestDone event reports the result within ``limit_s``. ``name``: noun in messages, e.g.
+        "recording". Raises RequestRefused if no task can begin now.
         """
         if reason := self.interlocks.why_not_task():
             raise RequestRefused(reason)

@@ -41,7 +41,7 @@ class SerialPort:
     ``parameter``: the parameter that names the port, for messages.
 
     ``close`` must leave DTR and RTS raised. Otherwise the next opening would raise them again, and
-    some boards restart when this happens.
+    some boards restart when these signals are raised.
     """
 
     ends_with_us = False
@@ -184,8 +184,7 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 def _write_whole(descriptor: int, data: bytes) -> None:
     """Write all bytes. While the port accepts none, sleep; pyserial would not sleep.
 
-    Raises TimeoutError if, after 0.2 s (``WRITE_TIMEOUT_S``), the port still does not accept the
-    rest of the bytes.
+    Raises TimeoutError if the port has not accepted all bytes after 0.2 s (``WRITE_TIMEOUT_S``).
     """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:

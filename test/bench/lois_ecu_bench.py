@@ -40,7 +40,7 @@ class Stage:
 
     ``paths``: names of the terminals.
 
-    ``heard``: for each board, the commands that it has read, as (time in s, bytes).
+    ``heard``: for each board, the commands that it has read. A command is a pair: time in s, bytes.
     """
 
     def __init__(self, boards: int) -> None:

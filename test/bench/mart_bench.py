@@ -27,7 +27,8 @@ SETTLING_S: Final = 8.0
 No event reports that they are ready.
 """
 LATEST_S: Final = 0.9
-"""Longest latency in s that is expected. A later datagram belongs to the next command."""
+"""Longest latency in s that is expected. If a datagram comes later, it belongs to the next
+command."""
 LARGE: Final = 3
 """Smallest change of a motor's speed, in MART's units, that shows a new command.
 

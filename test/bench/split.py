@@ -28,9 +28,10 @@ within: list[float] = []
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Replace a method by one that adds its processor time in the reader's thread to ``stage``.
+    """Replace a method by one that also measures processor time, and adds this time to ``stage``.
 
-    The time of other stages that the method calls is not included.
+    Only the time in the reader's thread is measured. The time of other stages that the method calls
+    is not included.
     """
     method: Callable[..., Any] = getattr(owner, name)
 

@@ -28,18 +28,16 @@ TRANSIT: Final = 200
 """Largest number of frames that are in transit when a comparison begins: the board has sent them
 before, but the driver may publish them after that."""
 REACH: Final = 200
-"""Number of sent frames with which a published message is compared.
-
-They are the next frames after the one that matched the previous message. If none of them is equal
-to the message, the message is wrong.
-"""
+"""Number of sent frames that are compared with one published message. They are the next frames
+after the one that matched the previous message. If no frame equals the message, the message is
+wrong."""
 
 
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    Board and adapter do not depend on the computer: if this thread is delayed, bytes that arrived
-    in the meantime are delivered together.
+    A busy computer does not slow down the board and the adapter. So if this thread is delayed, it
+    then delivers all bytes together that arrived during the delay.
 
     ``silent_s``: the longest time between two deliveries so far, in s.
     """
@@ -88,8 +86,8 @@ class PiecesTerminal(Terminal):
     def _arrival_s(self, count: int, to_come: int) -> float:
         """Return the time at which the last byte of the next piece arrives.
 
-        ``count``: number of bytes that the board sends in this tick. ``to_come``: how many of them
-        have not arrived yet.
+        ``count``: number of bytes that the board sends in this tick. ``to_come``: how many of these
+        bytes have not arrived yet.
         """
         return self._tick_at + (count - to_come + min(PIECE, to_come)) * BYTE_S
 

@@ -40,7 +40,7 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 
 ``NEW_VARIANCE``: largest variance of x just after a reset of odometry, in m².
 
-``GAP_MPS2``: largest acceleration in a gap of data, in m/s².
+``GAP_MPS2``: largest acceleration of the robot in a gap of the data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
 """If one byte in 100 is lost, one of this number of published messages may be wrong."""
@@ -217,7 +217,8 @@ class Rig:
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
         """Expect the motors to be off soon after ``since_tick``, and to stay off for ``rest_s``.
 
-        ``allowed_s``: longest time from ``since_tick`` to standstill. ``grace_s`` is added to it.
+        ``allowed_s``: longest time from ``since_tick`` to standstill. The ``grace_s`` of the rig is
+        added to this time.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)
@@ -286,7 +287,8 @@ class Rig:
 
         Also expect that odometry does not jump, timestamps increase, and no reading is rejected.
 
-        ``damaged_bytes``: if True, a few wrong messages and rejected readings are allowed.
+        ``damaged_bytes``: whether the line damages bytes. If so, a few wrong messages and rejected
+        readings are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

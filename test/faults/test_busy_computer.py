@@ -9,9 +9,9 @@ from omnibot_board import BOARD
 
 
 def test_a_busy_computer_loses_no_message(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """Four busy loops run, and the line delivers four bytes at a time.
+    """A busy computer loses no message: the driver publishes all that the board sends, in order.
 
-    Everything that the board sends is published, in order.
+    Four busy loops run, and the line delivers four bytes at a time.
     """
     with PiecesRig(tmp_path, BOARD, **lenience) as rig:
         is_busy(rig, ticks=200)

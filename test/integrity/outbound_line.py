@@ -16,8 +16,9 @@ CHANGED: Final = -2
 Arrival = tuple[int, float, int]
 """A byte that arrives: its value, its position in the write, and its origin.
 
-The origin of a byte that the driver wrote is its position. Otherwise, the origin is ``ADDED`` or
-``CHANGED``. The position of an added byte is a number between the positions of two written bytes.
+The origin shows where the byte comes from. For a byte that the driver wrote, it is the position of
+the byte. Otherwise, it is ``ADDED`` or ``CHANGED``. The position of an added byte is a number
+between the positions of two written bytes.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 

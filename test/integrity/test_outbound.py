@@ -85,7 +85,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The board obeys a motion frame that has lost its last byte for less than 1.5 ms.
+    """A motion frame that has lost its last byte is in effect for less than 1.5 ms.
 
     The first byte of the next write completes the frame. This byte is a zero, so the frame is
     wrong. The board obeys the wrong frame only until it receives the frame of that next write.
@@ -110,9 +110,10 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """A Stop has lost one byte, and the first byte of the next Stop completes its frame.
+    """The judge reports stray motion if the board makes a command of a damaged Stop.
 
-    From this frame, the board reads a wheel command of 255 LSB. The judge reports stray motion.
+    The Stop has lost one byte, and the first byte of the next Stop completes its frame. The board
+    reads this frame as a wheel command of 255 LSB.
     """
     judge = Judge()
     judge.write(parse(STOP), 0.0)
@@ -125,9 +126,11 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """The board still follows the set-point of the previous write. The judge reports no error.
+    """The judge distinguishes an old set-point from a set-point that was never sent.
 
-    A set-point with a changed bit is reported as uncommanded.
+    For a moment, the board still follows the set-point of the previous write. The judge reports no
+    error. Later, the board follows a set-point with a changed bit. The judge reports this set-point
+    as uncommanded.
     """
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
@@ -204,10 +207,10 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """Without a scene's name, ``over`` adds the scores of all scenes in which the robot must stop.
+    """The function ``over`` adds the scores of one scene, or of all scenes with a stop.
 
-    With the name of a scene, it adds only the scores of this scene, even if the robot need not
-    stop in it.
+    Without a scene's name, it adds the scores of all scenes in which the robot must stop. With the
+    name of a scene, it adds only the scores of this scene, even if the robot need not stop in it.
     """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),

@@ -225,7 +225,7 @@ def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> No
 def test_a_prefix_without_its_slash_is_told_at_the_start(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """The user sets a ``frame_prefix`` without a slash. The driver warns at its start.
+    """The driver warns at its start if the user's ``frame_prefix`` does not end with a slash.
 
     The warning shows a resulting frame name, ``robot1odom``.
     """
@@ -236,9 +236,9 @@ def test_a_prefix_without_its_slash_is_told_at_the_start(
 def test_who_does_not_want_transforms_hears_nothing_of_tf(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """The parameter ``publish_tf`` is false, so the driver does not warn that tf2_ros is missing.
+    """If ``publish_tf`` is false, the driver does not warn that tf2_ros is missing.
 
-    The driver still gives other warnings, for example about simulated time on a real port.
+    It still gives other warnings, for example about simulated time on a real port.
     """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but the board on /dev/null runs in real time")
@@ -248,9 +248,9 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """With ``use_sim_time``, measurements wait until /clock has a time.
+    """With ``use_sim_time``, the driver publishes measurements only when /clock has a time.
 
-    This also applies to a simulated board, although it runs in real time.
+    It also waits for /clock if the board is simulated, although this board runs in real time.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

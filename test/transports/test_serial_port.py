@@ -139,9 +139,9 @@ The module ``termios`` does not have it.
 
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
-    """A write fails because the buffer of the line is full.
+    """After a failed write, the port discards the unsent data, so the next write succeeds.
 
-    The port then discards the unsent data in this buffer, so the next write succeeds.
+    The write fails because the buffer of the line is full.
     """
     port = SerialPort(terminal.path, 115200)
     terminal.fill()

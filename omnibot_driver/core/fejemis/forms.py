@@ -15,8 +15,8 @@ VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
 """``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum.
 
-Of 24 lines of one kind, the lines that do not have the learnt form are counted. When their number
-reaches the limit, lines of this kind are no longer checked.
+The decoder counts the lines that do not have the learnt form, among 24 lines of one kind. When this
+count reaches the limit, the decoder no longer checks the form of this kind of line.
 """
 OF: Final = 24
 
@@ -33,7 +33,7 @@ class Forms:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Learn the form of a line, and return whether this form is accepted.
+        """Return whether the form of a line is accepted, and learn from this form.
 
         ``summed``: whether the line has a correct checksum.
         """

@@ -78,9 +78,9 @@ class Ports:
         return self.halves[channel].role or ROLES[channel ^ self.swapped]
 
     def identify(self) -> bool:
-        """Find out which board is at which port. Called after a heartbeat.
+        """Find out which board is at which port. Call this after a heartbeat.
 
-        Return whether the known order of the boards has changed.
+        Return whether the order of the boards has changed since it was last known.
         """
         first, second = (half.role for half in self.halves)
         if first == second:

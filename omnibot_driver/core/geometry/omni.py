@@ -28,7 +28,7 @@ class OmniKinematics:
 
     @property
     def rims(self) -> "OmniKinematics":
-        """The same geometry with wheels of 1 m radius, so wheel rates are rim speeds in m/s."""
+        """The same kinematics with wheels of 1 m radius. Its wheel rates are rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

@@ -2,7 +2,8 @@
 
 """History of the states of a filter.
 
-If a restart of the board is noticed late, the filter returns to an earlier state.
+If the driver notices a restart of the board late, the filter returns to its state before the
+restart.
 
 This module works on states and times. It does not know what a state means.
 """
@@ -18,7 +19,7 @@ arrive between a restart of the board and its detection."""
 
 
 class FilterHistory:
-    """History of the states of one filter."""
+    """History of the states of a single filter."""
 
     def __init__(self, estimate: SparseFilter) -> None:
         self._filter = estimate

@@ -55,8 +55,8 @@ class RecordReading(Unstamped):
 class RecordComes:
     """Notification that lines of a record are arriving.
 
-    It also comes for a record that the driver has already given up, because the board still sends
-    this record. The board takes up to 1.3 s to send a record.
+    The board takes up to 1.3 s to send a record. If the driver has given the record up, the board
+    sends it nevertheless, and this notification comes too.
     """
 
 

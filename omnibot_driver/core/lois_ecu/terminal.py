@@ -39,13 +39,18 @@ class ModeChange:
         """
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping: dict[str, str] = {}
-        """Changes that wait until the robot has been stopped: new values of parameters, by name."""
+        """Changes that wait for the stop of the robot. They are new values of parameters, by
+        name."""
         self._stopping_since_s: float | None = None
         self.left = False
-        """Whether the board has left a terminal mode. The code that reads this value clears it."""
+        """Whether the board has left a terminal mode. The code that reads this value then sets it
+        to False."""
 
     def connect(self) -> None:
-        """Begin a new connection. The board may be in any mode."""
+        """Begin a new connection.
+
+        At its beginning, the driver does not know the mode of the board.
+        """
         self._told = None
 
     def want(self, mode: TerminalMode) -> None:
@@ -66,7 +71,10 @@ class ModeChange:
 
     @property
     def terminal(self) -> bool:
-        """Whether a terminal mode was written, so that the board may send the lines of a sensor."""
+        """Whether the driver has written a terminal mode.
+
+        The board may then send the lines of a sensor.
+        """
         return self._told is not None
 
     @property
@@ -106,8 +114,8 @@ class ModeChange:
         """Return the command to send now, or None. A mode is changed only after a standstill.
 
         First, the driver sends Stop until it sees the robot at rest, but for at most
-        ``UNPROVED_S``. Then RPM 0/0 is sent, because the public firmware would count backward duty
-        as forward motion while it keeps a positive RPM target.
+        ``UNPROVED_S``. Then it sends RPM 0/0, which clears the board's RPM target. While this
+        target is positive, the public firmware counts backward motion by duty as forward motion.
 
         ``stands``: whether the robot is seen at rest.
 
@@ -146,7 +154,10 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """Record a message that the board sends only outside terminal modes: none is active now."""
+        """Record a message that the board sends only outside terminal modes.
+
+        It shows that no terminal mode is active now.
+        """
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:

@@ -49,10 +49,8 @@ TRAITS: Final = Traits(
     },
 )
 ANSWERED: Final = NoticeReading("", halt=False)
-"""A reading without effect, which only shows that the server answers.
-
-NOTHING_MEASURED is not used here: it makes the motion monitor forget its earlier measurements.
-"""
+"""A reading without effect, which only shows that the server answers. NOTHING_MEASURED has an
+effect: it makes the motion monitor forget its earlier measurements. So it is not used here."""
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
 FARTHEST_M: Final = 1000.0
@@ -126,9 +124,10 @@ class MartBoard(Board):
         self._mode = Mode.UNKNOWN
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that a datagram from this channel yields.
+        """Return the readings that follow from a datagram of this channel.
 
-        Once the mode is nominal, a reply without any other reading yields the reading ANSWERED.
+        Once the mode is nominal, a reply from which no other reading follows gives the reading
+        ANSWERED.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -193,7 +192,8 @@ class MartBoard(Board):
     def actuator(self, proof: StopProof) -> "Conductor":
         """Return the actuator.
 
-        The ``Pilot`` behind it records each stop and each start of the robot in ``proof``.
+        The actuator passes commands to the ``Pilot``, which records each stop and each start of the
+        robot in ``proof``.
         """
         self._pilot.proof = proof
         return Conductor(self._pilot)
@@ -231,7 +231,7 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server reports a heading of exactly zero, because it has not done an RM yet.
+        """Whether the server reports a heading of exactly zero. It does so before its first RM.
 
         RM is the forward drive. After the first RM, the server's clock must not be set back.
         Otherwise the next RM would report a wrong heading, because RM integrates the turn rate over
@@ -262,10 +262,10 @@ class Conductor:
         return self._pilot.wake_at
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the order is so slow that the driver regards it as a standstill.
+        """Return whether the driver regards the order as a standstill, because it is so slow.
 
-        A goal (GoTo) is never regarded as a standstill. Raises CommandRefused if the goal is more
-        than FARTHEST_M (m) away from the robot.
+        The driver never regards a goal (GoTo) as a standstill. Raises CommandRefused if the goal is
+        more than FARTHEST_M (m) away from the robot.
         """
         if isinstance(order, GoTo):
             way_m = self._pilot.odometry.pose.way_to(order.place).way_m

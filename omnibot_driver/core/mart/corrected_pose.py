@@ -79,9 +79,10 @@ class CorrectedPose:
         return True
 
     def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add the first of two runs of the last move to the pose.
+        """Add the first run of a controlled move to the pose, if the robot has made the move twice.
 
-        A duplicate of the request has started the second run. Only the second run was measured.
+        A duplicate of the request for the move has started the second run. Only the second run was
+        measured.
 
         ``amount``: the expected distance of a complete run in m, or its expected turn in rad.
         """

@@ -39,8 +39,8 @@ TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 PIVOT: Final = 0.01
 """Standard deviation of the distance between the robot's centre and the point about which it turns.
 
-It is a fraction of the track width, and applies to turns on the spot by 1 rad or more. For smaller
-turns, it is multiplied by the angle in rad.
+The value is a fraction of the track width. It applies to turns on the spot by 1 rad or more. For a
+smaller turn, the value is multiplied by the angle in rad.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
@@ -75,7 +75,7 @@ class Doubt:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all errors, because the odometry frame now begins at the robot's pose."""
+        """Set all errors to zero, because the odometry frame begins at the robot's present pose."""
         self._walk = Covariance()
         self._levers = [(0.0, 0.0, 0.0)] * 5
         self._bend_before_rad = 0.0
@@ -140,10 +140,11 @@ class Doubt:
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the constant heading error of this motion: the server now reports the heading.
+        """Remove the constant heading error of this motion, because the server reports the heading.
 
-        Until now, the turn of this motion was computed from the commands. Its random heading error
-        stays in the covariance. So does the position error from the removed constant error.
+        Before, the turn of this motion was computed from the commands. Two errors stay in the
+        covariance: the random heading error, and the position error that the constant heading error
+        has caused.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -158,7 +159,7 @@ class Doubt:
         self._walk = self._walk.with_errors(_around(m2, rad2))
 
     def end(self) -> None:
-        """Add the errors that the start and the coasting of the ended motion have caused."""
+        """Add the errors that the start and the coasting of the motion have caused."""
         self.add(END_M**2, END_RAD**2)
 
     def end_straight(self) -> None:
@@ -196,7 +197,8 @@ class Doubt:
     def total(self, more: Errors) -> Covariance:
         """Return the covariance of the pose.
 
-        ``more``: errors that arose after the last encoder count, and are not stored here.
+        ``more``: errors that arose after the last encoder count. The result includes them, but this
+        object does not store them.
         """
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
         size, bias, *others = self._levers

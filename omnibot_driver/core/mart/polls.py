@@ -64,7 +64,10 @@ class Polls:
         return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
-        """Record that the query was sent. The query of one sonar also delays that of the other."""
+        """Record that the query was sent.
+
+        After the query of one sonar, the other sonar's query must wait.
+        """
         self._asked_s[word] = now
         if word in SONARS:
             for each in SONARS:

@@ -35,9 +35,9 @@ the time is negative and becomes huge. The server then reports 1e15 degrees, for
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is predicted after its last report."""
 ODD_TIMES: Final = 3
-"""Number of implausible headings in a row after which the last of them is accepted."""
+"""Number of implausible headings in a row. When it is reached, the last of them is accepted."""
 SPREADS: Final = 4
-"""Averaging time of the turn rate, as a multiple of a reply's time uncertainty."""
+"""Time over which the turn rate is averaged, as a multiple of the time uncertainty of a reply."""
 
 
 class RelativeHeading:
@@ -46,7 +46,8 @@ class RelativeHeading:
     ``told_s``: time of the last accepted heading.
 
     ``from_s``: earliest time at which the server may have measured the last certain heading. A
-    heading is certain if it surely answers its own query (RMRA), and not an earlier query.
+    heading is certain if it surely is the reply to the last query (RMRA), and not a late reply to
+    an earlier one.
 
     ``changed_s``: time of the last change of heading.
 
@@ -149,7 +150,7 @@ class RelativeHeading:
         return bool(turn_rad)
 
     def begins_anew(self, angle_rad: float) -> bool:
-        """Return whether a heading is zero because the server has restarted, not by a turn."""
+        """Return whether a heading of zero shows a restart of the server, and not a turn."""
         known = self._angle_rad is not None and abs(self._angle_rad) > OLD_RAD
         return self.may_begin_anew and angle_rad == 0.0 and known
 

@@ -18,10 +18,10 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Part of the final yaw rate that may still be missing when a turn on the spot begins.
+"""Part of the final yaw rate that the command may still lack when a turn on the spot begins.
 
 An acceleration limit raises the commanded rate gradually (a ramp). The server cannot change the
-rate of a turn, so the turn waits for the end of the ramp.
+rate of a turn that has begun. So the turn begins only near the end of the ramp.
 """
 
 

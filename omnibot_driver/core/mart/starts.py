@@ -155,9 +155,9 @@ class Starts(FailedStarts):
         return words.B.request("SLOW")
 
     def _check(self, now: float) -> Packets:
-        """Return the request that checks the IMU.
+        """Return the request that checks the IMU; no packets while it must wait.
 
-        Return no packets while the check is not due, or while a late reply to another request could
+        It waits until the check is due. It also waits while a late reply to another request could
         be mistaken for the reply to the check.
         """
         word = self.imu.word

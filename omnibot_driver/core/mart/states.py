@@ -147,17 +147,15 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server starts the motors and never answers, or it waits for the IMU. Exception:
-it answers the controlled turns MCR and MCL. This answer is a failure that names the dead IMU.
-Before it, some servers turn the robot for 0.5 s.
+With a dead IMU, the server does not answer most of these commands: it starts the motors, or waits
+for the IMU. It answers only the controlled turns MCR and MCL. This answer is a failure that names
+the dead IMU. Before the answer, some servers turn the robot for 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
-"""Commands whose duplicate does harm if it arrives after another motion has begun.
-
-So before the next start, the driver waits until no duplicate can arrive. After that it checks the
-IMU, if the start needs this check.
-"""
+"""Commands whose duplicate does harm if it arrives after another motion has begun. So before the
+next start, the driver waits until no duplicate of such a command can arrive. After the wait, it
+checks the IMU if the start needs this check."""
 
 WHILE: Final[Mapping[Motion, State]] = {
     Motion.NONE: State.STILL,

@@ -25,7 +25,8 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of counts within 1 of the count before a start, which show that the start was lost."""
+"""If this number of counts differ by at most 1 from the count before a start, the start was
+lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class WheelCount:
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
     ``maybe``: the last reported count, if it differs by at most 1 from the count before the start
-    command; otherwise 0. Such a count shows that the start command may be lost.
+    command; otherwise 0. A count that differs so little shows that the start command may be lost.
     """
 
     def __init__(self) -> None:
@@ -69,7 +70,10 @@ class WheelCount:
         self._same = self._odd = 0
 
     def begin(self) -> None:
-        """Record that a start command was sent. If it arrives, the count begins at zero again."""
+        """Record that a start command was sent.
+
+        If the server receives it, the count begins at zero again.
+        """
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
         self.certain = self._confirmed = False
@@ -82,7 +86,8 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        Nothing changes if the server has acknowledged the motion. Otherwise there are two cases:
+        If the server has acknowledged the motion, nothing changes. If it has not, there are two
+        cases:
 
         - A count of the motion has come. The motion had begun, so the server was restarted. The
           pose already includes the counts of the motion.
@@ -104,12 +109,15 @@ class WheelCount:
         self.may_begin_anew = self._unseen = True
 
     def appear(self) -> None:
-        """Record that the server answers after an absence, in which it may have been restarted."""
+        """Record that the server answers again. It may have restarted while it did not answer."""
         if self.last is not None:
             self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
-        """Record that the motion is over. The next step begins at the last count received."""
+        """Record that the motion is over.
+
+        The next distance (Step) is measured from the last count received.
+        """
         self.last, self._begins = self._raw, False
         self.maybe = 0
 
@@ -170,10 +178,10 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether an uncertain count contradicts the last count of this motion.
+        """Return whether an uncertain count is a wrong reply: it contradicts the last count.
 
-        It does if it is clearly nearer to zero than the last count, or has the other sign. Such a
-        count is a wrong reply.
+        An uncertain count contradicts the last count of this motion if it is clearly nearer to
+        zero, or if it has the other sign.
         """
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:

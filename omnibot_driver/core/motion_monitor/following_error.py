@@ -18,9 +18,9 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-So a displacement is compared with the set-points that were in effect while it was measured, and
-with those of the last RISING_S before the measurement began. A robot that is clearly slower than
-all these set-points is assumed to be held.
+So a displacement is compared with two groups of set-points: those in effect while the displacement
+was measured, and those in effect in the last RISING_S before. If a robot is clearly slower than all
+of them, it is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01

@@ -13,15 +13,13 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated.
-
-Longer motion in a gap is unlikely: if the board sends no data, the driver stops the robot earlier.
-"""
+"""Longest time, in s of the board's clock, over which motion is interpolated. The robot seldom
+moves longer in a gap, because the driver stops it when the board sends no data."""
 NO_WAY: Final = Pose()
 
 
 class GapInterpolation:
-    """Estimates the motion of lost displacements from the displacements before and after them.
+    """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
     """

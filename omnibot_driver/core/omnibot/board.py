@@ -125,10 +125,10 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended in the stream of IMU frames; None if unknown.
+        """The place in the stream of IMU frames at which the last read ended; None if unknown.
 
-        The bytes that are not decoded yet show this place, because they may be the beginning of an
-        IMU frame.
+        The bytes that are not decoded yet show this place: they may be the beginning of an IMU
+        frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -204,7 +204,10 @@ class OmniBot:
         return readings + self._translation.readings(found, self._decoder.skipped, now)
 
     def discard(self) -> None:
-        """Discard the held bytes, because a frame in them would get the time of the next read."""
+        """Discard the held bytes.
+
+        A frame in these bytes would get a wrong time, that of the next read.
+        """
         self._decode_pieces()
         self._decoder.flush(self._decoder.last_arrival_s)
 
@@ -230,7 +233,7 @@ class OmniBot:
         """Do nothing: this board has no polls or subscriptions that the driver must end."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
-        """Return the stream that encodes commands and repeats their frames."""
+        """Return the stream of set-points, which encodes commands and repeats their frames."""
         return SetpointStream(self._encoder, proof)
 
     def wake(self) -> Packets:
@@ -255,7 +258,10 @@ class OmniBot:
         return packed(transmission(frames.encode(frames.STOP), frames.TOGGLE_PAUSE))
 
     def force_pause(self) -> Packets:
-        """Return Stop, S and P. After S, the board runs in any case. P then pauses it."""
+        """Return Stop, S and P.
+
+        S starts the board if it is paused, so P then pauses it in any case.
+        """
         stop = frames.encode(frames.STOP)
         return packed(transmission(stop, frames.FORCE_START, frames.TOGGLE_PAUSE))
 

@@ -27,10 +27,8 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 ONE_BYTE: Final = 5.5
 """Cost of a frame that lost or gained one byte. About one frame in 250 is damaged in this way."""
 TWO_BYTES: Final = 8.5
-"""Cost of a frame that lost or gained two bytes.
-
-The cost is less than twice ``ONE_BYTE``, because bytes are often lost together.
-"""
+"""Cost of a frame that lost or gained two bytes. Bytes are often lost together, so the cost is less
+than twice ``ONE_BYTE``."""
 BROKEN_OFF: Final = 9.0
 """Cost of a frame whose last three or more bytes were lost in a burst."""
 HEADER_BYTE: Final = 7.5
@@ -44,10 +42,8 @@ BAD_RUN: Final = 6.0
 Noise, or the loss of many bytes at once, causes such a run.
 """
 BAD_TAIL: Final = 2.5
-"""Extra cost of a run of unexplained bytes that begins after a frame but not with a header.
-
-Such a run is rare.
-"""
+"""Extra cost of a run of unexplained bytes that follows a frame but does not begin with a header.
+Such a run is rare."""
 UNKNOWN_START: Final = 1.0
 """Cost of assuming that the bytes begin within a frame, not at the beginning of one.
 
@@ -133,8 +129,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which no delta is expected any more. This rule ends with the first
-delta. It is used at the beginning of a stream, and again after damage."""
+"""Number of missing deltas after which no delta is expected any more. This rule applies only while
+no delta is known: at the beginning of a stream, and after damage, until a delta arrives."""
 
 
 class Context(NamedTuple):

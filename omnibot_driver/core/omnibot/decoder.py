@@ -3,8 +3,8 @@
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
 A header alone proves nothing: a gyro at rest gives the same bytes. If a frame directly follows an
-accepted one (it is *in step*), it is accepted unless evidence speaks against it. All other bytes
-are *uncertain*. They wait until the search in ``trellis`` has a clear result, or until
+accepted one (it is *in step*), it is accepted, except if evidence speaks against it. All other
+bytes are *uncertain*. They wait until the search in ``trellis`` has a clear result, or until
 ``DOUBT_BYTES`` are held.
 
 This module reads no clock, and no input makes it raise an exception.
@@ -47,7 +47,7 @@ CALM_S: Final = 10.0
 On a calm line, the decoder needs less evidence to accept the last byte of a frame.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""Number of certain frames after which the decoder discards an uncertain frame before them."""
+"""An uncertain frame is discarded as soon as this number of certain frames has followed it."""
 
 
 @dataclass(slots=True)
@@ -57,7 +57,7 @@ class DecoderStatistics:
     frames: int = 0
     discarded_bytes: int = 0
     faults: int = 0
-    """How often an accepted frame was followed by bytes that are not a frame."""
+    """Number of accepted frames that were followed by bytes that are not a frame."""
 
 
 class FrameDecoder:
@@ -119,7 +119,10 @@ class FrameDecoder:
         return found
 
     def flush(self, now: float) -> list[Frame]:
-        """Return the last frames from the held bytes, after the line was closed or fell silent."""
+        """Return the last frames in the bytes that are still held.
+
+        Call this after the line was closed or fell silent.
+        """
         self.last_arrival_s = now
         found: list[Frame] = []
         self.skipped = []
@@ -224,7 +227,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether the last byte held may begin another frame. The arrival times show it.
+        """Return whether the arrival times allow that the last byte held begins another frame.
 
         ``start``, ``length``: position and length of the last frame held. ``due``: whether another
         frame may follow this frame directly.
@@ -274,9 +277,9 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """Accept frames that are certain, and discard bytes in which no frame is certain.
+        """Accept certain frames, and discard bytes in which no frame is certain.
 
-        Return False if nothing was decided.
+        Return False if the method could neither accept nor discard anything.
         """
         state = self.context, self.expectation, self.pauses, self._pose_byte_order
         pieces = read(stretch, *state, in_step=self._in_step, closed=closed)

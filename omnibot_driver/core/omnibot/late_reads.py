@@ -3,7 +3,7 @@
 """The cause of a pause between two reads: an idle line, or a late reader.
 
 If the line is idle within a frame, bytes were lost there. All later frames then seem late by whole
-ticks. After a late read, later frames are on time again.
+ticks. If only the reader was late, later frames are on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
 contains, or which frames are accepted.

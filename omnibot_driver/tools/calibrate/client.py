@@ -137,7 +137,7 @@ class Client:
             self.set_parameters(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set the parameters in ``values``, except those that are fixed while the driver runs."""
+        """Set the parameters in ``values``, except those that cannot change in a running driver."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }

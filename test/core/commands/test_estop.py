@@ -70,9 +70,10 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """The e-stop is latched while the port is closed. The answer says that the port is not open.
+    """An e-stop that is latched while the port is closed is sent right after the reconnect.
 
-    After a reconnect, the emergency stop follows directly after the opening bytes.
+    The answer to the e-stop says that the port is not open. After the reconnect, the emergency stop
+    frame follows directly after the opening bytes.
     """
     bench.close()
     assert "port is not open" in estop(bench, True)
@@ -103,9 +104,9 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """After the release of the e-stop, the board ignores all commands until the board is reset.
+    """If the board holds the e-stop after its release, one notice advises the user to call ~/reset.
 
-    One notice advises the user to call ~/reset.
+    This board ignores all commands until it is reset.
     """
     bench = driving(estop_latches=True)
     estop(bench, True)

@@ -254,10 +254,10 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", ["linear_scale", "angular_scale"])
 def test_a_new_scale_of_odom_discards_a_goal(bench: Bench, scale: str) -> None:
-    """A scale of odom changes while the robot drives to a goal 3 m ahead.
+    """If a scale of odom changes during a drive to a goal, the driver discards the goal.
 
-    The goal would now be at another place of the board's frame, so the driver discards it. A notice
-    says so, and the next goal is accepted.
+    The goal was 3 m ahead. With the new scale, it would be at another place of the board's frame. A
+    notice says that the goal is discarded. The driver accepts the next goal.
     """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(0.2)

@@ -24,9 +24,9 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """While the robot drives, no more angles of the front wheel arrive.
+    """If no angle of the front wheel arrives for 60 ms during a drive, the driver stops the robot.
 
-    After 60 ms, the driver stops the robot without waiting for the next command.
+    It does not wait for the next command.
     """
     bench = nominal()
     bench.drive_on()
@@ -48,9 +48,9 @@ def refusal(bench: Bench) -> str:
 
 
 def test_without_angles_a_command_is_refused_because_of_the_front_board() -> None:
-    """The front board sends no more angles, and the drive board sends as before.
+    """If the front board sends no more angles, the refusal of a command names the front board.
 
-    The refusal of a command names the front board.
+    The drive board sends as before.
     """
     bench = nominal()
     bench.carry = lambda channel, data: b"" if channel == FRONT else data
@@ -77,9 +77,10 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """The driver does nothing for 80 ms, and then reads one port before the other.
+    """A late driver does not blame the front board before it has read this board's port.
 
-    Until it has read the front board's port, the refusal of a command names the computer.
+    The driver does nothing for 80 ms. Then it reads one port, and after that the other. Until it
+    has read the front board's port, the refusal of a command names the computer.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}

@@ -222,9 +222,10 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 def test_the_limit_of_a_line_does_not_depend_on_the_chunking(
     lines: list[bytes], data: st.DataObject
 ) -> None:
-    """Lines of about 200 characters arrive in any pieces, even with the line end in another piece.
+    """Lines of about 200 characters are decoded in the same way in whatever pieces they arrive.
 
-    The decoder returns the same messages and counts as if all bytes arrived in one piece.
+    Even the line end may arrive in another piece than the line. The decoder returns the same
+    messages and counts as if all bytes arrived in one piece.
     """
     stream = b"\n".join(lines)
     whole, split = FejemisDecoder(), FejemisDecoder()
@@ -277,7 +278,10 @@ def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> 
 
 
 def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None:
-    """One heartbeat without its checksum may be damaged. Two in a row show a real change."""
+    """A change in the use of checksums is accepted when two heartbeats in a row show it.
+
+    A single heartbeat without its checksum may be damaged.
+    """
     decoder = FejemisDecoder("auto")
     feed(decoder, with_sum(BEAT) + b"\n")
     feed(decoder, BEAT + b"\n" + with_sum(BEAT) + b"\n" + BEAT + b"\n")
@@ -332,10 +336,11 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
     """The decoder discards lines that do not have the learnt form, and counts them.
 
-    It begins a new count after every 24 lines (a window). When a count reaches 8, the decoder no
-    longer checks the form of this kind of line. Here, one window ends with 7 wrong lines, and the
-    next window begins with 7 wrong lines. All 14 are discarded. The 8th wrong line of the second
-    window is accepted. ``windows``: number of earlier windows without wrong lines.
+    It begins a new count after every 24 lines of a kind (a window). When the count reaches 8 within
+    one window, the decoder no longer checks the form of this kind of line. Here, one window ends
+    with 7 wrong lines, and the next window begins with 7 wrong lines. All 14 are discarded. The 8th
+    wrong line of the second window is accepted. ``windows``: number of earlier windows without
+    wrong lines.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

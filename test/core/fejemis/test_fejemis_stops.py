@@ -48,7 +48,7 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
 
 
 def test_the_stop_of_an_estop_is_a_word_alone() -> None:
-    """The driver sends ``stop`` without padding.
+    """For an e-stop, the driver sends the word ``stop`` without padding.
 
     Some related firmware accepts only the bare word.
     """
@@ -104,8 +104,9 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 
 
 def test_a_pause_survives_a_reconnect_and_the_release_of_an_estop() -> None:
-    """The e-stop is latched, the user pauses the robot, and the port of the front board is lost.
+    """A pause continues after a reconnect and after the release of an e-stop.
 
+    The user pauses the robot while the e-stop is latched. Then the port of the front board is lost.
     When the e-stop is released, the driver does not send the line ``start`` to the boards. Only the
     user's ~/start ends the pause.
     """
@@ -139,10 +140,10 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 
 
 def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
-    """Both boards lose their power, and the ports stay open. Motion commands are refused.
+    """If both boards lose their power, refusals soon say that the boards send no data.
 
-    At first, the driver's reads may be late, so the refusal says that nothing was read. Later, it
-    says that the boards send no data.
+    The ports stay open. At first, the driver's reads may be late, so a refusal of a motion command
+    says that nothing was read. Later, it says that the boards send no data.
     """
     bench = nominal()
     bench.drive_on()
@@ -158,10 +159,10 @@ def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
 def assert_the_estop_is_the_answer_and_the_pause_continues(
     bench: Bench, answer: RequestDone, mark: float
 ) -> None:
-    """Check that ``answer`` is a failure because of the e-stop. Then release the e-stop.
+    """Check that ``answer`` is a failure because of the e-stop, and that the pause continues.
 
-    The robot must stay paused until the next ~/start. From the time ``mark`` (in s) until this
-    ~/start, the driver must not send the line ``start``.
+    The e-stop is released. After that, the robot must stay paused until the next ~/start. From the
+    time ``mark`` (in s) until this ~/start, the driver must not send the line ``start``.
     """
     assert not answer.success
     assert "release it with ~/estop" in answer.message
@@ -206,9 +207,10 @@ def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None
 
 
 def test_a_start_of_a_driven_robot_interrupts_its_motion_only_for_a_moment() -> None:
-    """The user calls ~/start while the robot drives, and the command rate is 1 Hz.
+    """A ~/start during a drive interrupts the motion only for a moment.
 
-    A Stop precedes ``start``. The motion command follows immediately, and not after up to 1 s.
+    The driver sends Stop before ``start``, and the motion command right after it. The command does
+    not wait for its regular repetition, which comes only once a second here.
     """
     bench = nominal(commands=CommandSettings(timeout_s=60.0, rate_hz=1.0))
     bench.drive()

@@ -61,10 +61,11 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """The board keeps reporting 12 RPM for a wheel at rest. The driver commands 7 RPM backward.
+    """The odometry detects that a wheel was at rest before the driver started it again.
 
-    If the wheel were rolling, it would now slow down from 12 RPM. So the odometry detects that the
-    wheel was at rest, and adds no distance.
+    The board keeps reporting 12 RPM for this wheel. The driver commands 7 RPM backward. A wheel
+    that rolled would now slow down from 12 RPM. This wheel does not, so the odometry adds no
+    distance.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)

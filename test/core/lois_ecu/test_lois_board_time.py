@@ -46,9 +46,9 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """Reads are up to 30 ms late at random.
+    """If reads are up to 30 ms late at random, the estimated standard deviation is 5 to 25 ms.
 
-    The standard deviation that is estimated for the delay is 5 to 25 ms.
+    It is the standard deviation of the estimated delay.
     """
     board, random = BoardTime(), Random(1)
     for step in range(100):
@@ -58,9 +58,9 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """The estimated delay is 0 until the unit of the board's clock is known.
+    """The estimated delay is 0 while the unit of the board's clock is unknown, and after a restart.
 
-    After a restart, the delay is 0 again, and its standard deviation is 12 ms.
+    After a restart, the standard deviation of the delay is 12 ms.
     """
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0

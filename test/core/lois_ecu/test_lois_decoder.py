@@ -176,9 +176,9 @@ def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> Non
 
 @pytest.mark.parametrize("kind", RecordKind)
 def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKind) -> None:
-    """A line of a record is lost, doubled, cut or foreign. The decoder returns no wrong record.
+    """The decoder drops a damaged record completely, and decodes the next record.
 
-    It then decodes the next record.
+    A line of the damaged record is lost, doubled, cut or foreign.
     """
     samples = tuple(range(20, 31))
     record = Record(kind, samples, () if kind is RecordKind.HEADING else samples[:5])
@@ -208,7 +208,7 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
     """The decoder discards a record that was not requested, and reports how many lines it had.
 
-    Without a request, the decoder cannot detect that lines of a record are lost.
+    Only for a requested record can the decoder detect that lines are lost.
     """
     decoder = LoisDecoder()
     record = encode_report(Record(RecordKind.RPM, (11, 12), (13, 14)))
@@ -265,9 +265,9 @@ def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
 
 @pytest.mark.parametrize("unit", ["ms", "ns"])
 def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
-    """The board's clock counts ns in the manual, but ms in the public firmware.
+    """The decoder learns the unit of the board's clock from the reports.
 
-    The decoder infers the unit from the reports.
+    The clock counts ns in the manual, but ms in the public firmware.
     """
     said = reports(4.0, firmware=unit == "ms")
     _, decoder = decoded(pieces(said))

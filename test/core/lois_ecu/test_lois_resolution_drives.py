@@ -2,9 +2,9 @@
 
 """Drives of a simulated LOIS robot with few or many encoder ticks per turn.
 
-If a wheel has more than about 1000 ticks per turn, the simulated board cannot measure its speed.
-The tests then command duties. The public firmware loses fast ticks, so the tests of this firmware
-have at most 60 ticks per turn.
+If a wheel has more than about 1000 ticks per turn, the simulated board cannot measure the speed of
+the wheel. So the tests command duties to this board. The public firmware loses fast ticks, so the
+tests of this firmware have at most 60 ticks per turn.
 """
 
 import math
@@ -23,7 +23,7 @@ def true_pose(bench: Bench) -> Pose:
 
 
 def error_m(bench: Bench) -> float:
-    """Return the distance in m from the true position to that of the odometry."""
+    """Return the distance in m between the true position and the position in the odometry."""
     return true_pose(bench).way_to(bench.odometry[-1].pose).way_m
 
 
@@ -117,9 +117,10 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """The robot drives out and back. When it is back, the board's clock wraps, and a read is late.
+    """The driver does not take a wrap of the board's clock for a restart.
 
-    Clock and counts are then near zero, as after a restart. But the driver assumes no restart.
+    The robot drives out and back. When it is back, the board's clock wraps, and a read is late. The
+    clock and the counts are then near zero, as they are after a restart.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, -2.6)

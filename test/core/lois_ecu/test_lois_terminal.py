@@ -152,7 +152,10 @@ def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """In a terminal mode, the board obeys an e-stop. After its release, motion is still refused."""
+    """In a terminal mode, the board obeys an e-stop.
+
+    After the release of the e-stop, the driver still refuses motion, because of the terminal mode.
+    """
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -188,11 +191,11 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
-    """The user sets duty mode in a forward drive, then drives backward. Odometry shows this motion.
+    """Odometry shows backward motion by duty after a forward drive.
 
-    After a Stop, the public firmware still has the RPM target of the forward drive. While this
-    target is positive, it counts all ticks as forward. So the driver clears the target before it
-    drives by duty.
+    The user sets duty mode in a forward drive, then drives backward. After a Stop, the public
+    firmware still has the RPM target of the forward drive. While this target is positive, the
+    firmware counts all ticks as forward. So the driver clears the target before it drives by duty.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -359,9 +362,11 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
-    """The user sets a terminal mode, and sets ``host`` again while the robot is being stopped.
+    """A terminal mode that the user takes back does not lead to refusals of motion.
 
-    The board stays in its normal mode, so motion is allowed. The earlier motion is not continued.
+    The user sets a terminal mode. While the robot is being stopped, the user sets ``host`` (the
+    normal mode) again. The board stays in its normal mode, so motion is allowed. The earlier motion
+    is not continued.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 1.0)

@@ -139,10 +139,10 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
-    """After a straight drive, the heading is often exactly zero, as after a restart.
+    """The log can be downloaded after a straight drive.
 
-    A restart would lose the log. The driver does not assume a restart, so the log can be
-    downloaded.
+    After such a drive, the heading is often exactly zero. It is also zero after a restart, which
+    would lose the log. The driver does not take the zero for a sign of a restart.
     """
     for seed in range(3):
         bench = MartBench(firmware, seed=seed).ready()

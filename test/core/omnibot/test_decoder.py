@@ -81,8 +81,8 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
     """A frame of an undamaged stream is returned as soon as its last byte arrives.
 
-    There are two exceptions. A frame whose values jump may be returned later, and so may a frame
-    whose last byte may begin a header.
+    There are two exceptions. The decoder may return a frame later if its values jump, or if its
+    last byte may begin a header.
     """
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
@@ -116,9 +116,10 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """A shock affects the IMU frames before and after a delta. Then the line is silent.
+    """The decoder returns all frames of a shock, which continues after a delta and until a silence.
 
-    The adapter delivers the last frame in two parts. The decoder returns all frames.
+    The shock affects the IMU frames before and after the delta. The adapter delivers the last IMU
+    frame in two parts. Then the line is silent.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
@@ -186,8 +187,8 @@ def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
 ) -> None:
     """Decoding starts at any of the first 345 bytes. All frames but at most two are returned.
 
-    To save time, not every start is tested in all cases. If the bytes come in ticks, every 9th byte
-    is a start. If they come one by one, every 23rd byte is a start.
+    To save time, the test does not begin at each byte in all cases. If the bytes come in ticks, it
+    begins at every 9th byte. If they come one by one, it begins at every 23rd byte.
     """
     ticks = ticks_of(name)[:40]
     stream = b"".join(ticks)
@@ -241,10 +242,7 @@ def test_one_whole_text_is_enough_to_believe() -> None:
 
 
 def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
-    """At the beginning of a stream, a wrong byte follows two frames.
-
-    The decoder rejects both frames.
-    """
+    """The decoder rejects two frames at the beginning of a stream if a wrong byte follows them."""
     look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
     assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
 

@@ -89,9 +89,10 @@ def test_both_sequences_count_by_themselves_and_wrap() -> None:
 
 
 def test_a_sequence_goes_on_after_a_pause() -> None:
-    """The board is paused during a drive and starts again. SEQ continues.
+    """After a pause, SEQ continues.
 
-    The first delta after the pause also contains the motion during the pause.
+    The board is paused during a drive and starts again. The first delta after the pause also
+    contains the motion during the pause.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))

@@ -61,9 +61,9 @@ def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_kn
 
 
 def test_wheel_counts_are_those_of_the_wheels() -> None:
-    """Only wheel B turns, and deltas are in wheel counts.
+    """Deltas in wheel counts contain the counts of the single wheels.
 
-    A delta has 39 counts for B and 0 for the others.
+    Only wheel B turns. A delta has 39 counts for B, and 0 for A and C.
     """
     a, b, c = last(driven(WHEEL_B, 2.0, frame="wheel_counts"), DELTA, 3)
     assert (a, c) == (0, 0)
@@ -111,9 +111,10 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """The robot is held at an angle. This angle and the mounting turn the measured gravity.
+    """The IMU of a tilted robot measures gravity in the axes of its mounting.
 
-    REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
+    The robot is held at an angle. Both this angle and the mounting of the IMU turn the measured
+    gravity. REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
     """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)
@@ -122,9 +123,10 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 
 
 def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
-    """Someone turns the robot to the left by hand. Its wheels do not turn.
+    """If a robot is turned by hand, its gyro measures the turn, but its wheels do not turn.
 
-    The gyro, mounted upside down, reads a negative rate.
+    Someone turns the robot to the left. The gyro is mounted upside down, so it reads a negative
+    rate.
     """
     board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
     board.hold(yaw_rate=radians(30))

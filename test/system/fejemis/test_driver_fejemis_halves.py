@@ -30,9 +30,9 @@ STOP = "rc 2 0 0"
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """One of the two Teensys is unplugged during a drive. The driver stops the other Teensy.
+    """If one of the two Teensys is unplugged during a drive, the driver stops the other one.
 
-    When the unplugged Teensy is plugged in again, the driver stops it, too.
+    When the unplugged Teensy is plugged in again, the driver stops it as well.
     """
     said = len(driver.lines)
     assert probe.call(SetBool, "brush", data=True).success
@@ -103,10 +103,10 @@ def test_nothing_is_promised_while_both_ports_are_missing(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """One of the two Teensys restarts or becomes silent during a drive.
+    """If one of the two Teensys restarts or falls silent during a drive, the robot is stopped.
 
-    The driver stops the robot although the commands continue. When both work again, the robot obeys
-    new commands.
+    The driver stops the robot although the commands continue. When both Teensys work again, the
+    robot obeys new commands.
     """
     said = len(driver.lines)
     with driven(probe, robot):
