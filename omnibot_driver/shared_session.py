@@ -60,12 +60,12 @@ class SharedSession:
         self.told = False
         """Whether the link wrote its last Stop to every line.
 
-        If the port is lost when the link ends, the reader opens it again and writes Stop. After
-        that, ``told`` is True only if a standstill had not been proved before (``Shutdown.owed`` is
-        True).
+        The port may be lost while the link ends. Then the reader opens it again and writes Stop. In
+        this case, ``told`` becomes True only if no standstill was proved before (``Shutdown.owed``
+        is True).
         """
         self.stood = False
-        """Whether, at the end of the link, Stop was sent and measurements showed the robot at
+        """Whether Stop was sent when the link ended, and measurements then showed the robot at
         rest."""
         self.closing = threading.Event()
         """Set when all threads must end."""
@@ -99,14 +99,15 @@ class SharedSession:
     ) -> None:
         """Call ``action`` with the session and ``wish``, the motion that a sender commands.
 
-        * ``sent_ns``: possible times at which the command was sent, as time of day in ns. While the
-          sender's clock is not known well, there are two possible times.
+        * ``sent_ns``: times at which the sender may have sent the command, as time of day in ns.
+          There are two such times while the sender's clock is not known well.
         * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
           the motion interlock must know that the sender is still active.
 
-        Raises CommandRefused if ``action`` refuses the command, or if the command was sent while
-        this process was stalled. In both cases, the function ``refused`` gets the reason. It
-        is not called if too many events wait for delivery.
+        Raises CommandRefused if ``action`` refuses the command. Also raises CommandRefused if the
+        command was sent while this process was stalled. In both cases, the function ``refused`` is
+        called with the reason. There is one exception: if too many events wait for delivery,
+        ``refused`` is not called.
         """
         try:
             with self.lock:
@@ -181,7 +182,7 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Stop the robot if this process was stalled; return whether this call stopped it."""
+        """Stop the robot if this process was stalled. Return True only if this call stopped it."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:
@@ -191,7 +192,7 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer thread runs, and send the guard process a heartbeat if due.
+        """Record that the pacer thread runs. If a heartbeat is due, send it to the guard process.
 
         If this method is not called for 0.4 s, the driver regards itself as stalled.
         """

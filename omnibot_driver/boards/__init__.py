@@ -36,7 +36,8 @@ class Profile(Protocol):
     """The functions and values that the profile of a board must have. A profile is a module."""
 
     SIMULATOR: str
-    """Name of the package with the simulated board. It is imported only when it is used."""
+    """Name of the package with the simulated board. The package is imported only when a
+    simulated board is used."""
 
     PARAMETERS: Table
     """All parameters of the board."""
@@ -93,10 +94,11 @@ def table_for(given: Mapping[str, object]) -> Table:
 
 
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
-    """Return the values of all parameters of one board: the given values, otherwise the defaults.
+    """Return the values of all parameters of one board.
 
-    ``given`` also names the board. Raises ParameterError if a value is wrong, or if the board does
-    not have a given parameter.
+    A parameter that is not in ``given`` has its default value. ``given`` also names the board.
+
+    Raises ParameterError if a value is wrong, or if the board does not have a given parameter.
     """
     table = table_for(given)
     for name in given:

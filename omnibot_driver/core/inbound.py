@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The inbound path: from bytes of the board, or elapsed time, to measurements and events.
+"""The inbound path turns bytes from the board into measurements and events.
 
-This module knows the board, the measurements and the safety stops; it does not know what the bytes
-mean, or what is commanded.
+Some measurements and events follow from elapsed time alone. This module knows the board, the
+measurements and the safety stops. It does not know what the bytes mean, or which motion is
+commanded.
 """
 
 from collections.abc import Sequence
@@ -27,7 +28,7 @@ from omnibot_driver.core.safety import SafetyStops
 
 
 class Inbound:
-    """Passes the board's readings on to ``measurement``, ``safety`` and ``reporter``."""
+    """Passes the board's readings on to the measurements, the safety stops and the reporter."""
 
     def __init__(
         self,
@@ -53,9 +54,9 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        If these bytes change the mode, the result is empty. ``hear`` then adds the estimates to the
-        events that the reporter holds, and calls ``process`` itself. So the change of mode takes
-        effect before any command is handled.
+        There is one exception: these bytes change the mode of the board. Then the result is empty.
+        ``hear`` adds the estimates to the reporter's events instead, and calls ``process`` itself.
+        So the change of mode takes effect before the driver handles the next command.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -74,9 +75,9 @@ class Inbound:
         return []
 
     def process(self, now: float) -> bool:
-        """Handle the readings of the last ``hear``.
+        """Handle the readings that the last call of ``hear`` has decoded.
 
-        Return whether there may be packets to write or events to report.
+        Return False if there is certainly nothing to write to the board and no event to report.
         """
         last, self._last = self._last, None
         if (

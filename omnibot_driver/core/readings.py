@@ -17,7 +17,7 @@ Vector3 = tuple[float, float, float]
 class Unstamped:
     """A reading whose ROS message has no stamp, such as a state or the result of a request.
 
-    It is also published while simulated time has not begun.
+    It is published even before simulated time has begun, because it needs no stamp.
     """
 
 
@@ -37,10 +37,12 @@ class ImuReading:
 class DisplacementReading:
     """Motion of the robot in a short time, in m and rad.
 
-    * ``frame``: the board's earth frame, or the body's own axes.
-    * ``duration_s``: length of this time, in s; None if unknown, e.g. after a pause.
-    * ``lost``: number of missing displacements before this one.
-    * ``restarted``: whether the board's counters and earth frame seem to start again here.
+    * ``frame``: the axes of the motion: the board's earth frame, or the robot's body axes.
+    * ``duration_s``: time in s in which the robot made this motion; None if unknown, e.g. after a
+      pause.
+    * ``lost``: number of missing displacements directly before this one.
+    * ``restarted``: whether the board's counters and its earth frame seem to begin anew with this
+      displacement.
     * ``measured``: False if the values are not a valid measurement, e.g. if the board only reports
       the commanded values.
     * ``possible``: False if the robot cannot move so fast. The cause may be a correction of the
@@ -59,7 +61,8 @@ class DisplacementReading:
 
 
 NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)
-"""Placeholder reading for a board that is alive, but has not reported its motion."""
+"""Placeholder reading. It shows that the board is alive, although the board has not reported a
+motion."""
 
 
 @value(frozen=True, slots=True)
@@ -68,8 +71,8 @@ class PoseReading:
 
     * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
       does not count them again.
-    * ``restarted``: whether the counter of poses starts again here. If so, the counter of
-      displacements has already started again before this pose.
+    * ``restarted``: whether the board's counter of poses begins anew with this pose. Then the
+      board's counter of displacements began anew before this pose.
     """
 
     x_m: float
@@ -83,8 +86,8 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    * ``continues``: whether the board's previous report also said this, and the board has not
-      restarted since.
+    * ``continues``: whether the board's previous report was a PausedReading too, and the board has
+      not restarted between the two.
     """
 
     continues: bool = False
@@ -96,10 +99,10 @@ class OdometryReading:
 
     * ``stamp_s``: time of measurement, in s of the host's steady clock.
     * ``twist``: in the board's body axes.
-    * ``twist_variances``: of linear and angular speed, in m²/s² and rad²/s².
+    * ``twist_variances``: variances of the linear and the angular speed, in m²/s² and rad²/s².
     * ``rolled``: sum of the tangents (twist x time) that the wheels have measured since the board
       object was made, in the board's body axes.
-    * ``rolling``: present rate of change of ``rolled``, as a twist; None while the board does not
+    * ``rolling``: present rate of change of ``rolled``, as a twist. None while the board does not
       report it.
     """
 
@@ -123,7 +126,7 @@ class EStopButtonReading(Unstamped):
 class ResetReading:
     """The board shows that it has obeyed a reset.
 
-    ``remark``: what remains unproved, as a sentence; empty if everything is proved.
+    ``remark``: a sentence that says which part of the reset is not proved; empty if all is proved.
     """
 
     remark: str = ""
@@ -163,17 +166,18 @@ Reading = (
 
 @value(frozen=True, slots=True)
 class SampleBoundary:
-    """Where a read of the port ended in the stream of IMU samples.
+    """How far the stream of IMU samples had arrived when a read of the port ended.
 
-    * ``ahead``: 1 if the read contains at least the first part of a sample for which no ImuReading
-      was returned yet, else 0.
-    * ``cut``: whether only the first part of this sample has arrived.
+    * ``ahead``: 1 if the read contains at least the first part of a sample that was not returned as
+      an ImuReading yet, else 0.
+    * ``cut``: whether the end of this sample is missing. Such a sample is called a cut sample.
 
     The times are in s after the read:
 
-    * ``latest_s``: latest time at which the cut sample can be complete; 0 without a cut sample.
-    * ``earliest_s``: earliest time at which the cut sample can be complete. Without a cut sample:
-      earliest time at which the next sample can be complete.
+    * ``latest_s``: latest time at which the cut sample can be complete. It is 0 without a cut
+      sample.
+    * ``earliest_s``: earliest time at which the cut sample can be complete. Without a cut sample,
+      this is the earliest time at which the next sample can be complete.
     """
 
     ahead: int

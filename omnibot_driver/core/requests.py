@@ -10,7 +10,7 @@ OnExit = Literal["stop", "pause", "reset"]
 
 
 class Request(Enum):
-    """A request to a board. Its value is the noun in messages such as "a start is under way"."""
+    """A kind of request to a board. The values are nouns for messages: "a start is under way"."""
 
     START = "start"
     PAUSE = "pause"

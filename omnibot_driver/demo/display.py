@@ -31,8 +31,10 @@ def status_row(
 ) -> str:
     """Return a row of the table under ``HEADING``: state, rates, lap, pose and velocities.
 
-    ``rates_hz``: rate of the IMU (None without an IMU) and rate of the odometry. ``leg``: number of
-    completed sides of the square. ``velocities``: the commanded twist, then the measured one.
+    ``rates_hz``: rate of the IMU (None without an IMU) and rate of the odometry.
+
+    ``leg``: number of completed sides of the square, over all laps. ``velocities``: the commanded
+    twist and the measured twist, in this order.
     """
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
@@ -59,7 +61,9 @@ def introduce(
 ) -> None:
     """Print what the demo does, and commands that the user can try.
 
-    ``options``: arguments of the simulator, then of the driver. ``exports``: environment variables.
+    ``options``: a text with the simulator's arguments, and one with the driver's arguments.
+
+    ``exports``: environment variables for the user's shell.
     """
     imu = f"\n  ros2 topic hz {namespace}/imu/data_raw" * capability.imu
     turning = (
@@ -86,11 +90,18 @@ In another terminal with ROS 2 Jazzy, you can watch and stop the robot:
 class Drive:
     """The results of a drive.
 
-    ``way_m``: distance driven. ``laps``: number of driven laps of the square.
-    ``pose``, ``true_pose``: the robot's pose at the end: by odometry, and in the simulation.
+    ``way_m``: distance driven.
+
+    ``laps``: number of driven laps of the square.
+
+    ``pose``, ``true_pose``: the robot's last pose. ``pose`` is from the odometry, and ``true_pose``
+    is from the simulation.
+
     ``points``: the driven path, as x and y in m.
+
     ``page``: path of the document about the board, which the last text of the demo names.
-    ``real``: arguments after ``--ros-args`` with which the driver is started for a real robot.
+
+    ``real``: arguments after ``--ros-args`` with which the user starts the driver for a real robot.
     """
 
     seconds: float

@@ -19,7 +19,8 @@ NOT_POLLABLE: Final = (
     " /dev/ttyACM0, or sim:// for all ports"
 )
 NONE_MISSING: Final[Mapping[int, str]] = {}
-"""Value of ``missing`` for a transport whose lines are either all open or all closed."""
+"""Value of ``missing`` for a transport of which no line is missing. This is also the value if
+all lines are closed."""
 
 
 class LinesChanged(Exception):
@@ -35,25 +36,29 @@ class Transport(Protocol):
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """File descriptors by channel, for another process to inherit; None for a missing line.
+        """File descriptors in the order of the channels, for another process to inherit.
 
-        The result is None if descriptors cannot be inherited.
+        A missing line has None instead of a descriptor. The result is None if descriptors cannot be
+        inherited.
         """
 
     @property
     def missing(self) -> Mapping[int, str]:
-        """Missing lines by channel, each with the reason and what to do; empty if all are open."""
+        """The missing lines. The result is empty if no line is missing.
+
+        Each key is a channel. The value says why its line is missing, and what to do.
+        """
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether the other end is in this process, like a simulated board in memory.
+        """Whether the board is in this process, such as a simulated board in memory.
 
         Such a board ends with this process, so the driver does not start a guard process for it.
         """
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes since the opening; None if it does not count this."""
+        """How often the kernel has lost bytes since the port was opened; None if it is unknown."""
 
     def read(self) -> Packet:
         """Wait for a packet; return an empty packet if none arrives for a while.
@@ -65,9 +70,9 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets.
 
-        One of several lines may be missing. The bytes that this line does not accept at once are
-        discarded. Raises LinkError if the connection is lost. The bytes that are not sent yet are
-        then discarded.
+        One of several lines may be missing. Such a line gets only the bytes that it accepts at
+        once. The other bytes for it are discarded. Raises LinkError if the connection is lost. Then
+        all bytes that are not sent yet are discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -33,7 +33,8 @@ class CommandShaper:
     """The checks and limits of motion commands. Every method may raise CommandRefused.
 
     * ``limits``, ``kinematics``: may be replaced at any time.
-    * ``control``: control method that a switch on the board selects; None without this switch.
+    * ``control``: the control method for which the switch on the board is set. None if the board
+      has no such switch.
     """
 
     def __init__(
@@ -52,11 +53,12 @@ class CommandShaper:
         self.limited = 0
         """Number of commands that exceeded the limits."""
         self.sideways = False
-        """Whether the last body velocity had a sideways part that the wheels cannot produce."""
+        """Whether the last commanded body velocity had a sideways part that the wheels cannot
+        produce."""
 
     @property
     def takes_velocities(self) -> bool:
-        """Whether the control switch, if any, permits velocities."""
+        """Whether the board accepts velocities. The switch on the board can forbid them."""
         return self._control != "position"
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
@@ -82,7 +84,7 @@ class CommandShaper:
         )
 
     def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
-        """Return the set-point for wheel rates in rad/s, in the sequence of ``Traits.wheels``."""
+        """Return the set-point for wheel rates in rad/s. The order is that of ``Traits.wheels``."""
         if not self.takes_velocities:
             raise self._at_odds(Authority.WHEELS)
         wheels = self._board.traits.wheels

@@ -19,14 +19,14 @@ from omnibot_driver.core.fejemis.sums import MODULUS
 ROUNDED: Final = 5
 """Largest allowed rounding of an angle, in tenths of a degree."""
 MOST_OWED: Final = 0.5
-"""Largest rounding error that is added to the next angle, in degrees."""
+"""Largest rounding error, in degrees, that is carried over to the next angle."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit in degrees for a wrong angle that the board may read from a damaged line.
+"""Limit in degrees for a wrong angle.
 
-If damage removes the minus sign, and the checksum does not detect this, the board reads an angle to
-the right as an angle to the left. The driver chooses the text of an angle so that a wrong angle of
-this kind is smaller than ``ACROSS``.
+Damage on the line can remove the minus sign of an angle, and the checksum may not detect this. Then
+the board reads an angle to the right as an angle to the left. The driver chooses the text of each
+angle so that such a wrong angle is smaller than ``ACROSS``.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -38,7 +38,10 @@ class AngleRelay:
         self._owed_deg = 0.0
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
-        """Return the ``fwl`` line with the angle. ``sums``: whether the caller adds a checksum."""
+        """Return the ``fwl`` line with the angle, without a checksum.
+
+        ``sums``: whether the caller adds a checksum to the line.
+        """
         wanted_deg = math.degrees(angle_rad) + self._owed_deg
         told_deg = max(-LARGEST_DEG, min(LARGEST_DEG, wanted_deg))
         # Without a checksum, the board detects no loss. A whole number never grows if a digit is
@@ -49,10 +52,10 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield each number that a board may read if it loses two characters of ``text`` unnoticed.
+    """Yield each number that a board may read if two characters of ``text`` are lost unnoticed.
 
-    The checksum does not detect the loss of some pairs of characters. If the characters that remain
-    are not a number, yield 0.
+    The checksum does not detect the loss of some pairs of characters. There is one number for each
+    of these pairs. If the characters that remain are not a number, this number is 0.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
@@ -81,7 +84,10 @@ def _with_sum(tenths: int) -> bytes:
 
 
 def _written(tenths: int) -> list[str]:
-    """Return all texts for an angle in tenths of a degree, with and without redundant zeros."""
+    """Return all possible texts for an angle. Some of them have zeros that could be left out.
+
+    ``tenths``: the angle in tenths of a degree.
+    """
     whole, tenth = divmod(abs(tenths), 10)
     heads = [str(whole), f"0{whole}"] if whole else ["0", ""]
     tails = [f".{tenth}", f".{tenth}0"] if tenth else ["", ".", ".0", ".00"]

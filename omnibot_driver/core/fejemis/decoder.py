@@ -18,7 +18,9 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""How many heartbeats in a row prove that the board now sends, or no longer sends, checksums."""
+"""How many heartbeats in a row must differ from ``sums`` before the decoder changes ``sums``. A
+heartbeat differs if it has a checksum and ``sums`` is False, or the reverse. While ``sums`` is
+unknown, one heartbeat is enough."""
 
 
 @dataclass(slots=True)
@@ -41,9 +43,9 @@ class FejemisDecoder:
 
     ``changed``: whether ``sums`` has changed. The caller resets this flag.
 
-    ``doubtful``: True if the heartbeats have checksums but the last other line had none, or the
-    reverse. The user's setting must be auto. While ``doubtful`` is True, the driver's lines to the
-    board carry no checksum.
+    ``doubtful``: whether the heartbeats contradict the last other line: only one of the two has a
+    checksum. This can be True only if the user's setting is auto. While ``doubtful`` is True, the
+    driver's lines to the board carry no checksum.
 
     ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.
     """
@@ -117,7 +119,10 @@ class FejemisDecoder:
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
-        """Learn from a heartbeat whether the board's lines have checksums."""
+        """Update ``sums`` or ``contradicted`` from a heartbeat.
+
+        ``with_sum``: whether this heartbeat has a checksum.
+        """
         if self._line_sums != "auto":
             self.contradicted = with_sum is not self.sums
             return

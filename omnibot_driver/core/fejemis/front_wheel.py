@@ -16,11 +16,14 @@ HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all bits except the frame counter."""
 SICK_LINES: Final = 3
-"""How many lines in a row must report a fault before the sensor is regarded as faulty."""
+"""How many lines in a row must report a fault before the angle sensor is regarded as faulty."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Jump of the angle, in degrees, that is accepted in addition to a motion of the wheel at its
-highest speed (``FASTEST_DEGPS``)."""
+"""Tolerance, in degrees, for the change between two angles.
+
+A change is accepted if it is at most this tolerance plus the turn of the wheel at its highest speed
+(``FASTEST_DEGPS``).
+"""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -34,15 +37,16 @@ BITS: Final = (
     (1, True, "magneto core loops not finished"),
     (0, False, "supply in 5 V mode"),
 )
-"""For each diagnosis bit (manual, fwl): its number, its value without a fault, the fault's name."""
+"""The diagnosis bits of the angle sensor (manual, fwl). Each entry has three parts: the number
+of the bit, its value without a fault, and the name of the fault."""
 
 
 class FrontWheel:
     """State of the front wheel.
 
-    ``angle_rad``: the last accepted angle in rad; NaN before the first.
+    ``angle_rad``: the last accepted angle in rad. It is NaN before the first angle is accepted.
 
-    ``heard_at``: time in s at which this angle arrived.
+    ``heard_at``: time in s at which the last accepted angle arrived.
     """
 
     def __init__(self) -> None:
@@ -71,7 +75,7 @@ class FrontWheel:
 
     @property
     def stale_at(self) -> float:
-        """Time in s at which the last angle becomes too old, if no new one arrives before then."""
+        """Time in s from which the last accepted angle is too old for driving."""
         return self.heard_at + OLDEST_S + 1e-6
 
     @property
@@ -106,8 +110,8 @@ class FrontWheel:
         """Return whether the wheel can have reached the angle.
 
         The first angle is always accepted. A later angle is accepted if it is near the last
-        accepted angle. It is also accepted if the angle directly before it was rejected and is near
-        it.
+        accepted angle. If the previous angle was rejected, an angle near this rejected angle is
+        accepted too.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

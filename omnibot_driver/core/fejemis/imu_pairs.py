@@ -2,8 +2,9 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-A pair is a gyro line and an acceleration line. It is false if the two lines belong to different
-samples. This happens if the second line of one sample and the first line of the next were lost.
+A pair is a gyro line and an acceleration line. A pair is false if its two lines belong to different
+samples. A false pair arises if the second line of one sample and the first line of the next sample
+were lost.
 """
 
 import itertools
@@ -24,45 +25,50 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""Time in s between the two lines of a pair. If the second line comes as late as this or later,
-the pair may be false, so it must wait for the next pose."""
+"""Limit, in s, for the time between the two lines of a pair. If this time is as long as the
+limit or longer, the pair may be false, so the pair must wait for the next pose."""
 SILENT_S: Final = 0.1
-"""Length in s of a silence after which a new pair must wait for the next pose.
+"""Length in s of a silence of the board. After a longer silence, each new pair must wait for the
+next pose.
 
-The pair must wait even if its two lines come close together. The next pose shows whether the board
-was silent, or whether the host only read late. If the board was silent, the sampling time of the
-pair is unknown, so the pair is rejected.
+The pair must wait even if its two lines come close together. From the next pose, the driver
+learns whether the board sent nothing, or whether the host only read late. If the board sent
+nothing, the sampling time of the pair is unknown, so the pair is rejected.
 """
 WARY_S: Final = 1.0
-"""Time in s after a stall of the driver in which every pair must wait for the next pose. During the
-stall, the kernel's buffer may have overflowed. Lines are then lost, although the driver sees no
-silence."""
+"""Time in s after a stall of the driver. During this time, every new pair must wait for the next
+pose. The reason: while the driver stalled, the kernel's buffer may have overflowed. Then lines
+are lost, although the driver sees no silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits, in s, of a difference that shows which line of a sample comes first.
+"""Limits, in s, for the difference ``_evidence_s``, which shows which line of a sample comes first.
 
 The difference is the sum of the intervals before gyro lines, minus the sum of the intervals before
 acceleration lines. Each interval begins at the previous line of the other kind. The interval
-between two samples is longer than the interval within a sample. So if the difference is positive,
-the gyro line comes first, otherwise the acceleration line.
+between two samples is longer than the interval within a sample. So a positive difference shows that
+the gyro line comes first. A negative difference shows that the acceleration line comes first.
 
-``KNOWN_S``: smallest magnitude of the difference at which its sign is used. ``SUREST_S``: largest
-magnitude that is stored.
+``KNOWN_S``: the sign of the difference is used only if its magnitude is at least this value.
+
+``SUREST_S``: largest magnitude that is stored.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to an interval between a gyro and an acceleration line if a line of
-another kind arrives in this interval. Such an interval is probably between two samples."""
+"""Time in s that is added to some intervals between a gyro and an acceleration line. It is added
+if a line of another kind arrives in the interval, because such an interval is probably between
+two samples."""
 PATIENCE: Final = 60
-"""Number of intervals after which the driver decides which line of a sample comes first, even if
-the magnitude of the difference is still below ``KNOWN_S``. The difference stays that small if
-the two lines are half a period apart."""
+"""Largest number of intervals that the driver measures before it decides which line of a sample
+comes first. Then it decides even if the magnitude of ``_evidence_s`` is still below ``KNOWN_S``.
+The magnitude stays that small if the two lines are half a period apart."""
 MOST: Final = 10
-"""Largest magnitude of a counter. Each kind of line has a counter, except gyro and acceleration
-lines. A positive counter shows that lines of this kind usually come between two pairs. A
-negative counter shows that they usually come between the two lines of a pair."""
+"""Largest magnitude of a counter in ``_outside``. Each kind of line has such a counter, except
+gyro and acceleration lines. A positive counter shows that lines of this kind usually come
+between two pairs. A negative counter shows that they usually come between the two lines of a
+pair."""
 UNPOSED: Final = 20
-"""Largest number of gyro lines, or of acceleration lines, that may arrive after the last pose while
-a pair waits for the next pose. If more arrive, the pair is rejected."""
+"""Limit for the number of gyro lines since the last pose, and for the number of acceleration
+lines. If one of these numbers is above the limit, a pair that still waits for the next pose is
+rejected."""
 
 
 @dataclass(slots=True)
@@ -75,8 +81,8 @@ class Pair:
 
     ``skipped``: how many incomplete samples were left out since the previous pair.
 
-    ``doubtful``: whether the pair must wait for the next pose, because it may be false or follows a
-    silence.
+    ``doubtful``: whether the pair must wait for the next pose. It must wait if it may be false, or
+    if it came after a silence or a stall.
 
     ``next_pose_s``: the board's time of the next pose, if this pose arrived before ``take``
     returned the pair.
@@ -96,19 +102,19 @@ Oriented = tuple[Attitude, float]
 
 
 class ImuPairs:
-    """Forms pairs of a gyro line and an acceleration line, each from one sample of the IMU.
+    """Forms pairs. A pair is a gyro line and an acceleration line of the same sample of the IMU.
 
-    Orientations pass through unchanged: ``take`` returns them between the pairs, in order of
-    arrival.
+    Orientations are not changed. ``take`` returns pairs and orientations in order of arrival.
     """
 
     def __init__(self) -> None:
         self.begin()
 
     def begin(self) -> None:
-        """Forget all lines and their order, because the board's streams start again."""
+        """Forget all received lines and their order, because a new stream of lines begins."""
         self.first: Kind | None = None
-        """The keyword of the line that comes first in a sample; None while unknown."""
+        """The kind of line, gyro or acceleration, that comes first in a sample; None while
+        unknown."""
         self._evidence_s = 0.0
         """The sum of the intervals before gyro lines, minus the sum of the intervals before
         acceleration lines, in s. If it is positive, the gyro line of a sample comes first."""
@@ -118,12 +124,13 @@ class ImuPairs:
         self._between: set[str] = set()
         """The kinds of lines that arrived since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """For each kind of line except gyro and acceleration: how many came outside of pairs, minus
-        how many came within pairs."""
+        """A counter for each kind of line, except gyro and acceleration lines. Lines between two
+        pairs increase the counter, and lines within a pair decrease it."""
         self._skipped = 0
         self._silent = False
-        """Whether two successive gyro or acceleration lines came more than ``SILENT_S`` apart. New
-        pairs are then doubtful. The next pose, or the rejection of a pair, resets this flag."""
+        """Whether more than ``SILENT_S`` has passed between one gyro or acceleration line and
+        the next. While this flag is True, new pairs are doubtful. The next pose resets the flag,
+        and so does the rejection of a pair."""
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -147,9 +154,9 @@ class ImuPairs:
 
         ``kind``: the keyword of the line.
 
-        If the second line of a pair has not come yet, it is regarded as lost. There is one
-        exception: if lines of this ``kind`` usually come between the two lines of a pair, the pair
-        continues to wait.
+        A pair may still wait for its second line. Usually, this second line is then regarded as
+        lost. There is one exception: if lines of this ``kind`` usually come between the two lines
+        of a pair, the pair continues to wait.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -164,10 +171,10 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all pairs that still wait.
 
-        The time since the previous pose shows how many gyro and acceleration lines were sent. If
-        lines of both kinds are missing, any of the pairs may be false, so all waiting pairs are
-        rejected. They are also rejected at the first pose, and at a pose whose time is before that
-        of the previous pose.
+        The time since the previous pose shows how many gyro and acceleration lines the board has
+        sent. If both gyro and acceleration lines are missing, each of the waiting pairs may be
+        false. So all of them are rejected. Waiting pairs are also rejected at the first pose, and
+        at a pose whose time is before the time of the previous pose.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
@@ -184,9 +191,10 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the pairs and orientations up to the first doubtful pair, in order of arrival.
+        """Return the pairs and orientations in order of arrival, until a pair must wait for a pose.
 
-        The caller calls this after a pose and at the end of a read.
+        This doubtful pair and everything after it stay in the queue. The caller calls this method
+        after a pose and at the end of a read.
         """
         taken: list[Pair | Oriented] = []
         while self._queue:
@@ -259,16 +267,19 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Count lines, to learn whether lines of a kind usually come between or within pairs.
+        """Count lines, to learn whether a kind of line usually comes between pairs or in a pair.
 
-        ``kinds``: the kinds of the lines. ``step``: 1 if the lines came between pairs, -1 if they
+        ``kinds``: the kinds of the lines. ``step``: 1 if they came between two pairs, -1 if they
         came within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))
 
     def _learn(self, kind: Kind, pause_s: float, *, marked: bool) -> None:
-        """Learn which line of a sample comes first: the one with the longer interval before it."""
+        """Learn which line of a sample comes first.
+
+        The line that comes first has the longer interval before it.
+        """
         evidence_s = min(max(pause_s, 0.0), PERIOD_S) + (MARKED_S if marked else 0.0)
         self._evidence_s += evidence_s if kind == "gyro" else -evidence_s
         self._evidence_s = max(-SUREST_S, min(SUREST_S, self._evidence_s))

@@ -40,8 +40,9 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Age of the last IMU sample, in s, from which on an orientation is not published. The driver
-publishes each orientation together with the last IMU sample."""
+"""Largest age of the last IMU sample, in s, for which an orientation is published. The driver
+publishes each orientation together with the last IMU sample. If this sample is older, the
+orientation is discarded."""
 
 
 class Translation:
@@ -84,7 +85,7 @@ class Translation:
         self._begin_imu()
 
     def stalled(self) -> None:
-        """Record a stall of the driver, after which lines may be missing."""
+        """Record that the driver stalled. Lines from the time of the stall may be missing."""
         self._pairs.stalled()
 
     def _begin_imu(self) -> None:
@@ -142,7 +143,7 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add the IMU samples and orientations up to the first sample that must wait for a pose.
+        """Add IMU samples and orientations to the readings, until a sample must wait for a pose.
 
         The caller calls this method after a pose and at the end of a read.
         """

@@ -65,7 +65,7 @@ class BiasCorrector:
 
     @property
     def advice(self) -> str:
-        """Advice on settings that the measured gravity contradicts; empty if there is none."""
+        """Advice on settings, if they contradict the measured gravity; otherwise empty."""
         gravity_mps2 = self.calibration.gravity_mps2
         return "" if gravity_mps2 is None else self._board.gravity_advice(gravity_mps2)
 

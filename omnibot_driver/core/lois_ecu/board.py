@@ -2,7 +2,7 @@
 
 """Adapter that makes a LOIS ECU a ``Board`` of the driver; ``LoisConversation`` does the work.
 
-Between two tick reports of the board, the odometry is predicted.
+Between two tick reports of the board, the adapter predicts the odometry.
 """
 
 import math
@@ -43,12 +43,13 @@ RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
-In this time, stopped wheels come to rest, and four tick reports arrive. After the last repetition,
-the driver gives the reset up in less than ``UNPROVED_S``. So it never accepts small counts that do
-not change, if a reset would have set them to zero: each repetition restarts that time.
+This time is long enough for stopped wheels to come to rest, and for four tick reports to arrive.
+After the last repetition, the driver gives the reset up in less than ``UNPROVED_S``. Each
+repetition restarts ``UNPROVED_S``. So the driver never takes small counts that do not change for
+the proof of a reset that would have set them to zero.
 """
 STEADY_S: Final = 0.3
-"""Time in s without a change of the tick counts, after which the wheels are regarded as at rest.
+"""Time in s. If the tick counts do not change for this time, the wheels are regarded as at rest.
 The time is longer than the usual period of the tick reports."""
 
 
@@ -105,16 +106,17 @@ class LoisEcuBoard(Board):
     def reset_refusal(self) -> str:
         """Reason why a reset is refused; empty if a reset is allowed.
 
-        A reset is refused in a terminal mode: without ticks, the driver cannot confirm a reset.
+        A reset is refused in a terminal mode. In this mode the board sends no ticks, so the driver
+        could not confirm the reset.
         """
         return self._ecu.reset_refusal
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether unchanged ticks would now show that both wheels are at rest.
+        """Whether both wheels are certainly at rest if the ticks do not change now.
 
-        The public firmware counts a wheel's ticks only while its RPM target is positive. Otherwise,
-        unchanged ticks show nothing.
+        The public firmware counts a wheel's ticks only while the RPM target of this wheel is
+        positive. At other times, unchanged ticks do not show whether the wheels are at rest.
         """
         return self._ecu.translation.odometry.counting
 
@@ -129,7 +131,7 @@ class LoisEcuBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode ``data``, and return the readings that its bytes complete.
 
-        If only ``mode`` changes, return the placeholder reading ``NOTHING_MEASURED``.
+        If ``mode`` changes and no reading is complete, return the placeholder ``NOTHING_MEASURED``.
         """
         before = self.mode
         readings = self._read(self._ecu.receive(data, now))
@@ -146,7 +148,7 @@ class LoisEcuBoard(Board):
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return readings that were held back for long enough, and odometry if it is due."""
+        """Return readings that have been held back long enough. Add odometry if it is due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)
@@ -220,24 +222,22 @@ class LoisEcuBoard(Board):
 
     @property
     def wake_at(self) -> float:
-        """Time at which to call ``due`` and ``elapse`` next."""
+        """Time in s at which the caller must call ``due`` and ``elapse`` again."""
         if self._leaving:
             return self._odometry_due_at
         once_at = -math.inf if self._once else math.inf
         return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset_at_s)
 
     def leave(self) -> None:
-        """Make ``due`` return nothing from now on.
-
-        The driver's last Stop is then the last line that is sent.
-        """
+        """Make ``due`` return nothing from now on. So no line follows the driver's last Stop."""
         self._leaving = True
 
     def due(self, now: float) -> Packets:
         """Return the lines to write now.
 
-        They write settings or modes, request a date or a record, repeat a reset, drop a ball, or
-        command RPM 0/0 after a Stop.
+        These lines have different purposes. They write settings or modes, request a date or a
+        record, repeat a reset, release a ball (``distribute_ball``), or command RPM 0/0 after a
+        Stop.
         """
         if self._leaving:
             return NO_PACKETS
@@ -251,7 +251,7 @@ class LoisEcuBoard(Board):
         return packed(data) + once
 
     def actuator(self, proof: StopProof) -> SetpointStream:
-        """Return the stream that sends set-points, as RPM or as duty."""
+        """Return the object that sends set-points to the board, as RPM or as motor duty."""
         self._proof = proof
         return SetpointStream(self, proof, heard=self._heard)
 
@@ -263,10 +263,10 @@ class LoisEcuBoard(Board):
             self._say_reset_again(now)
 
     def encode(self, order: Order) -> Packets:
-        """Return the lines that command ``order``. Raises CommandRefused for a goal pose.
+        """Return the lines that command ``order``.
 
-        Also raises CommandRefused for any motion while a terminal mode, or a change of mode,
-        forbids motion.
+        Raises CommandRefused for a goal pose. In a terminal mode, or while the mode changes, it
+        raises CommandRefused for any motion, too.
         """
         match order:
             case Drive(twist):
@@ -284,7 +284,10 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop. Its ``:`` makes the board discard a partial line that came before."""
+        """Return Stop. The board may have received a part of a line before.
+
+        The ``:`` at the beginning of Stop makes the board discard this part.
+        """
         return self.stop()
 
     def stop(self) -> Packets:
@@ -292,17 +295,18 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """Return the set-points RPM 0/0, because the board has no e-stop command.
+        """Return the set-points RPM 0/0, which replace an emergency stop command.
 
-        In a terminal mode, return nothing.
+        The board has no such command. In a terminal mode, return nothing.
         """
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
         """Return Stop and the reset command. Return nothing while ``due`` repeats an earlier reset.
 
-        ``due`` repeats both lines until the ticks show the reset, the driver gives up the reset, or
-        the robot drives. In total, both lines are sent at most ``RESETS`` times.
+        ``due`` repeats both lines until one of three things happens: the ticks show that the board
+        has obeyed the reset, the driver gives the reset up, or the robot drives. In total, both
+        lines are sent at most ``RESETS`` times.
         """
         if self._reset_proof is not None and not (self._reset_shown or self._leaving):
             return NO_PACKETS
@@ -338,10 +342,10 @@ class LoisEcuBoard(Board):
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Request a record. A later reading contains the record, or the reason for a failure.
+        """Request a record. A later reading contains the record, or the reason why there is none.
 
-        Raises RequestRefused if the board cannot complete the record, or if it is in a terminal
-        mode or changes its mode.
+        Raises RequestRefused if the board cannot complete a record of this length. Also raises
+        RequestRefused while the board is in a terminal mode, or changes its mode.
         """
         self._ecu.record(kind, samples)
 

@@ -17,22 +17,22 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Least number of tick reports before a board is recognised as one that works as in the manual.
+"""Number of tick reports after which a board can be recognised as one that works as in the manual.
 
-The board is recognised when an odometry report with its own command byte (0x20) arrives. This is
-only possible if no odometry report with the command byte of a tick report (0x12) has arrived
-before.
+The board is recognised when an odometry report with its own command byte (0x20) arrives. A board
+that has sent an odometry report with the command byte of a tick report (0x12) is never recognised
+as such.
 """
 UNCOUNTED_M: Final = 0.06
-"""Distance in m, summed over both wheels, for which the wheels must roll backward. If neither
-count has fallen by then, the driver decides that the board does not count ticks backward."""
+"""Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
+count decreases, the driver decides that the board does not count ticks backward."""
 
 
 class BoardKind:
-    """Kind of the board. It selects how the motion filter ``motion`` models the board.
+    """The kind of one board. What is detected is written into the motion filter ``motion``.
 
-    ``appends``: whether the board sends an odometry report after each tick report, with the same
-    command byte (0x12), as the public firmware does.
+    ``appends``: whether an odometry report with the command byte of a tick report (0x12) follows
+    each tick report. The public firmware sends such reports.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -42,7 +42,10 @@ class BoardKind:
         self._lone_ticks, self._uncounted_m = 0, 0.0
 
     def took_ticks(self, counts: tuple[int, int]) -> None:
-        """Record a tick report. ``counts``: new ticks of each wheel since the last report."""
+        """Record a tick report.
+
+        ``counts``: for each wheel, the change of its tick count since the previous report.
+        """
         self._lone_ticks += 1
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
@@ -50,8 +53,8 @@ class BoardKind:
     def took_odometry(self, *, appended: bool) -> None:
         """Record an odometry report.
 
-        ``appended``: whether the report has the command byte of a tick report (0x12), as in the
-        public firmware, instead of its own (0x20).
+        ``appended``: True if the report has the command byte of a tick report (0x12), as in the
+        public firmware. False if it has its own command byte (0x20).
         """
         motion = self._motion
         if appended and not self.appends:
@@ -66,10 +69,10 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        It does if no count decreases, although a wheel is commanded backward and the board's
-        odometry shows that this wheel rolls backward.
+        The detection needs a wheel that is commanded backward and that rolls backward according to
+        the board's odometry. If no count decreases then, the board counts only forward.
 
-        ``told``: changes in the board's odometry since the previous odometry report, None if
+        ``told``: changes in the board's odometry since the previous odometry report; None if
         unknown.
         """
         if told is None or not self._motion.signed or self._seen_signed:

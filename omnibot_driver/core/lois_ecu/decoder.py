@@ -16,16 +16,17 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, TicksGate
 from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 
 LONGEST_LINE: Final = 256
-"""Largest accepted length of a line in bytes. It is longer than any line of a serial sensor."""
+"""Largest accepted length of a line in bytes. Lines of the board's sensors, such as the GPS, are
+shorter than this."""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
     """Counters of a decoder. After a reconnection, the next decoder continues the same counters.
 
-    ``lines``: valid lines.
+    ``lines``: number of valid lines.
 
-    ``faults``: discarded pieces of input that were not a line.
+    ``faults``: number of discarded pieces of input. Such a piece was not a valid line.
     """
 
     lines: int = 0
@@ -61,7 +62,8 @@ class LoisDecoder:
     def statistics(self) -> DecoderStatistics:
         """Counters of lines, faults and groups.
 
-        To continue the counters of an earlier decoder, assign them before the first ``feed``.
+        A new decoder can continue the counters of an earlier one. To do this, assign the earlier
+        decoder's counters to this property before the first ``feed``.
         """
         return self._statistics
 
@@ -94,7 +96,10 @@ class LoisDecoder:
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with ``left`` and ``right`` samples. All other records are discarded."""
+        """Expect a record, and discard all other records.
+
+        ``left``, ``right``: number of samples in the record, for the left and the right wheel.
+        """
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
@@ -102,10 +107,11 @@ class LoisDecoder:
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:
-        """Return the reports that ``data`` completes, in the order of sending.
+        """Return the reports that ``data`` completes, in the order in which the board sent them.
 
-        A report that may be complete is held back until the next line shows its end. With empty
-        ``data``, return the report that is held back, if no line has come for long enough.
+        A report may consist of several lines. So a report that may be complete is held back until
+        the next line shows its end. If ``data`` is empty and no line has come for long enough,
+        return the report that is held back.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))

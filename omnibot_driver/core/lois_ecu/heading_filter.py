@@ -12,9 +12,11 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Factor by which a turn increases the largest accepted difference between a heading and the
-expected heading. This difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn``:
-change of the odometry's yaw since the last heading, in degrees."""
+"""Factor for the largest accepted difference between a heading and the expected heading.
+
+This difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn`` is the change of the
+odometry's yaw since the last heading, in degrees.
+"""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -22,7 +24,7 @@ MISTAKEN_WITHIN_DEG: Final = 12.0
 
 
 class HeadingFilter:
-    """Filter of compass headings. ``refused``: number of headings that were rejected."""
+    """Filter of compass headings. ``refused``: number of headings that the filter has rejected."""
 
     def __init__(self) -> None:
         self.refused = 0
@@ -31,7 +33,7 @@ class HeadingFilter:
     def forget(self) -> None:
         """Forget all headings.
 
-        The next heading is rejected. The second is accepted if it agrees with the first.
+        The next heading is then rejected. The heading after it is accepted if these two agree.
         """
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
@@ -85,9 +87,11 @@ class HeadingFilter:
 
 
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
-    """Return the heading, -180..180 degrees, that is expected after the yaw has changed.
+    """Return the heading that is expected now, from -180 to 180 degrees.
 
-    ``before``: the last heading, and the yaw at that time.
+    It follows from the previous heading and from the change of the yaw since then.
+
+    ``before``: the previous heading in degrees, and the yaw in rad at that time.
     """
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 

@@ -18,13 +18,14 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Length in s of a time without reports. If several tick reports arrive together after a longer
-time without reports, their times are corrected. ``BoardTime`` handles shorter delays."""
+"""Limit in s for the time without reports. If no report arrived for longer than this, and then
+several tick reports arrive together, their times are corrected. ``BoardTime`` handles shorter
+delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor by which the computed time between two reports is increased. The rate of the board's clock
-is not known exactly. So if every read is late, the computed times could drift away from the arrival
-times. With this factor, they drift towards the arrival times."""
+"""Factor by which the computed time between two reports is increased. The rate of the board's
+clock is not known exactly. So if every read is late, computed times without this factor could
+differ from the arrival times more and more. With the factor, the difference becomes smaller."""
 
 
 @value(frozen=True, slots=True)
@@ -48,23 +49,24 @@ class LateReads:
         self.ticks_per_revolution = ticks_per_revolution
         self._last: Heard | None = None
         self._waited = False
-        """Whether the last tick report was read late. Later reports may then be late too."""
+        """Whether the last tick report was read late. If it was, the next reports may be late
+        too."""
         self._unit: ClockUnit | None = None
         self._arrived_s = self._latest_s = -math.inf
         self._rates: deque[float] = deque(maxlen=RATES_KEPT)
-        """The last measured durations of one unit of the board's clock, in s. Tick reports show
-        them."""
+        """The last measured durations of one unit of the board's clock, in s. Each is the time
+        between two tick reports, divided by the change of the board's clock."""
 
     def times(
         self, reports: list[Report], arrived: list[float], unit: ClockUnit | None
     ) -> list[float]:
         """Return the times in s of reports that were read together.
 
-        * ``arrived``: the time in s at which the last line of each report was read.
-        * ``unit``: the unit of the board's clock, None if unknown now.
+        * ``arrived``: for each report, the time in s at which its last line was read.
+        * ``unit``: the unit of the board's clock; None if it is unknown at present.
 
         If a clock in ns is near zero, either it has wrapped or the board has restarted. The clock
-        does not show which of the two, so the arrival times are returned.
+        does not show which of the two has happened, so the arrival times are returned.
         """
         self._unit = unit or self._unit
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]
@@ -91,8 +93,8 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether this report was read late. This means that no report arrived for more
-          than ``LATE_S``, and that this report then arrived together with later tick reports.
+        * ``late``: whether this report was read late. A report was read late if no report arrived
+          for more than ``LATE_S`` before it, and if later tick reports arrived together with it.
         * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s
@@ -115,8 +117,8 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        After a restart, clock and counts begin at zero. A clock in ns also returns to zero without
-        a restart, every 4.3 s.
+        After a restart, the clock and the counts begin at zero. The clock alone proves nothing: a
+        clock in ns begins at zero every 4.3 s even without a restart.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

@@ -27,7 +27,8 @@ OWN_GAINS: Final = (
     " `calibrate step`, or set these parameters"
 )
 """Advice if the user has not set all gains. The braces are replaced by the names of the missing
-gains. The errors of the odometry were measured in 150 forward drives with the compiled firmware."""
+gains. The errors in the text were measured in 150 forward drives, with a compiled build of the
+public firmware."""
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
     "the tick counts change faster than a wheel can turn, so the driver rejects the tick reports,"
@@ -35,8 +36,8 @@ TOO_FAST_ADVICE: Final = (
 )
 """Advice after ``TOO_FAST`` rejected tick reports in a row."""
 LOOK_AT: Final = 600
-"""Number of bytes without a valid line after which advice is given. The board sends at least 70
-bytes per second, so the advice comes within 9 s."""
+"""Number of received bytes after which the user gets advice, if no valid line was among these
+bytes. The board sends at least 70 bytes per second, so the advice comes within 9 s."""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
 _NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")
@@ -46,7 +47,8 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all received bytes, and ``understood`` when a report was decoded from them.
+    Call ``look`` with all received bytes. Call ``understood`` each time when a report was decoded
+    from these bytes.
 
     ``advice``: what the user should check; None while no misconfiguration is suspected.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines that make the robot move and stop, for a board that loses characters and complete lines."""
+"""The lines that make the robot move and stop. The board can lose characters and complete lines."""
 
 from typing import Final
 
@@ -23,20 +23,21 @@ from omnibot_driver.core.lois_ecu.messages import (
 STOP: Final = SetDuty(0, 0)
 EMERGENCY_STOP: Final = SetRpm(0, 0)
 MOST_RPM: Final = 50
-"""Largest allowed set-point in RPM. The firmware does not drive faster."""
+"""Largest allowed set-point in RPM. The firmware limits larger set-points."""
 MOST_PERCENT: Final = 100
 # After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""How often RPM 0/0 is sent after a Stop. If the robot drives again, RPM 0/0 is sent directly
-before each of the first set-points. While the robot stays stopped, RPM 0/0 is sent alone. Once
-would be enough, but lines may be lost."""
+"""Number of times that RPM 0/0 is sent after a Stop. One time would be enough, but lines may be
+lost. If the robot drives again, RPM 0/0 is sent directly before each of the first set-points.
+While the robot stays stopped, RPM 0/0 is sent alone."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
-    """Return the pair, rounded and limited to ±``most``, and whether a value was beyond this limit.
+    """Return a pair of values, limited to ±``most`` and rounded, and whether it was limited.
 
-    Both values are reduced by the same factor, so their ratio is kept.
+    If one value exceeds ``most``, both values are reduced by the same factor. So their ratio is
+    kept.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0
@@ -45,7 +46,7 @@ def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], 
 
 
 def set_points(data: bytes, *, with_sum: bool) -> list[SetRpm | SetDuty]:
-    """Return the set-points among the lines in ``data``, in order."""
+    """Return the set-points in ``data``, in order. Other lines in ``data`` are left out."""
     length = LENGTH if with_sum else LENGTH_WITHOUT_SUM
     found: list[SetRpm | SetDuty] = []
     for line in data.splitlines(keepends=True):

@@ -42,30 +42,34 @@ TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TURNS: Final = 0.3
 RESTARTED_TICKS: Final = 2
 RESTARTED_TURNS_PER_S: Final = 1.0
-"""Largest fall of a count that a wheel can cause by rolling back: ``RESTARTED_TURNS +
-RESTARTED_TURNS_PER_S * duration`` turns, and ``RESTARTED_TICKS`` ticks more. If a count falls
-further, the board has restarted."""
+"""Largest decrease of a count that a wheel can cause when it rolls back.
+
+This decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, and
+``RESTARTED_TICKS`` ticks more. If a count decreases by more than this, the board has restarted.
+"""
 SILENT_S: Final = 1.0
-"""Longest time in s without tick reports for which rolling wheels can explain small counts.
+"""Longest time in s without tick reports after which rolling wheels can still explain small counts.
 
 If the counts are near zero and the clock is irregular, there are two explanations: the board has
-restarted, or the wheels have rolled back. If no tick report came for a longer time, the driver
-assumes a restart.
+restarted, or the wheels have rolled back. If no tick report came for longer than this limit, the
+driver assumes a restart.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time, in s, for which the wheels may have rolled back, if the time is unconfirmed.
+"""Limit, in s, for the time in which the wheels may have rolled back.
 
 To detect a restart, the driver computes how far the wheels may have rolled back since the last tick
-report. Usually it uses the whole time since that report. If the unit of the board's clock has just
-become unknown, the clock cannot confirm this time, so the driver uses at most this limit.
+report. Usually the computation uses the whole time since that report. If the unit of the board's
+clock has just become unknown, the clock cannot confirm this time. Then the computation uses at most
+this limit.
 """
 IN_FLIGHT_S: Final = 0.5
-"""Time in s after a reset for which counts may still be from before the reset.
+"""Time in s, from the first counts after a reset, in which counts may still be from before the
+reset.
 
-The time begins when the first counts after the reset are read. The board may have sent counts
-before it received the reset, or the driver may have read them late.
+There are two causes for such counts. The board may have sent them before it received the reset.
+Or the driver may have read them late.
 """
 
 
@@ -82,9 +86,10 @@ class Translation:
         self.restarts = 0
         self.last_ticks_at_s = -math.inf
         self.ticked_at_s = -math.inf
-        """Time in s of the last report in which a count of ticks had changed."""
+        """Time in s of the last report in which at least one tick count had changed."""
         self._reset_until_s: float | None = None
-        """Time in s until which counts may be from before a reset. None if no reset was sent."""
+        """Time in s until which received counts may be from before a reset; None if no reset was
+        sent."""
         self._connect()
 
     @property
@@ -105,8 +110,8 @@ class Translation:
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._dated = False
-        """Whether the GPS has reported a date. The value stays True when midnight makes ``_date``
-        unknown."""
+        """Whether the GPS has ever reported a date. At midnight ``_date`` becomes unknown, but
+        this value stays True."""
         self._clock = (0, 0, 0)
         self._gps_works = False
 
@@ -116,9 +121,9 @@ class Translation:
         self._reset_until_s = None
 
     def reset(self) -> None:
-        """Begin new counts, because a reset is sent.
+        """Forget the earlier counts, because the driver sends a reset to the board.
 
-        Counts from before the reset may still arrive.
+        Counts from before the reset may still arrive after this call.
         """
         self._begin_counts()
         self._reset_until_s = math.inf
@@ -197,7 +202,8 @@ class Translation:
     def _was_reset(self, ticks: Ticks, read_s: float) -> bool:
         """Return whether the board may have obeyed a reset since the last report of ticks.
 
-        The result is True if a reset was sent and a count is nearer to zero than before.
+        The result is True if a reset was sent, and if a count is now nearer to zero than in the
+        last report.
 
         ``read_s``: time of the read in s. Unlike the report's time, it is not corrected for a late
         read.
@@ -244,10 +250,10 @@ class Translation:
         return []
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return how long ago the board's clock began at zero, in s. None if unknown.
+        """Return the time in s since the board's clock began at zero. None if it is unknown.
 
-        The clock begins at zero when the board starts. A clock in ns also begins at zero every
-        4.3 s. So the result for a clock in ns is known only if the clock began at zero after the
+        The clock begins at zero when the board starts. A clock in ns also begins at zero every 4.3
+        s. For such a clock, the result is known in only one case: the clock began at zero after the
         last tick report, and this report is less than 4.3 s old.
 
         ``duration_s``: time in s since the last tick report.
@@ -262,11 +268,13 @@ class Translation:
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
         """Return whether the clock and the counts prove a restart of the board.
 
-        Called if the counts and the clock may have begun at zero again. A small clock value alone
-        proves nothing, because a clock in ns begins at zero every 4.3 s. A restart is proved if the
-        clock does not fit the last reports, and rolling wheels do not explain the counts. If no
-        ticks came for more than ``SILENT_S``, the clock alone decides. Without a proof, a restart
-        is still possible, so an error is added to the odometry.
+        This method is called if the counts and the clock may have begun at zero again. A small
+        clock value alone proves nothing, because a clock in ns begins at zero every 4.3 s.
+
+        A restart is proved if two conditions hold: the clock does not fit the earlier reports, and
+        rolling wheels do not explain the counts. If no ticks came for more than ``SILENT_S``, the
+        first condition is enough. Without a proof, a restart is still possible, so the uncertainty
+        of the odometry is increased.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)
@@ -278,12 +286,12 @@ class Translation:
 
     @property
     def needs_date(self) -> bool:
-        """Whether the date is unknown although the GPS sends a position or a time."""
+        """Whether the GPS works, that is, sends a position or a time, but the date is unknown."""
         return self._gps_works and self._date is None
 
     @property
     def ticks(self) -> Ticks | None:
-        """Last ticks. None before the first ticks of a connection."""
+        """The last received tick counts. None until the first tick report of a connection."""
         return self._ticks
 
     def _displaced(self, estimates: list[FusedOdometry]) -> list[LoisReading]:
@@ -322,9 +330,10 @@ class Translation:
 
 
 def _is_date(date: GpsDate) -> bool:
-    """Return whether the GPS receiver has the date. Without it, it sends zeros or a false year.
+    """Return whether ``date`` is a real date from the GPS receiver.
 
-    Dates from 2038 on do not fit into a ROS time.
+    While the receiver does not have the date, it sends zeros or a false year. Dates from 2038 on
+    are rejected too, because they do not fit into a ROS time.
     """
     return bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
 

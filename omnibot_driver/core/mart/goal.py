@@ -21,14 +21,16 @@ SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
 """Motor units of controlled moves at normal speed, which are sent without the word SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""Number of moves after which a larger distance from the goal is accepted, and this distance in m.
+"""Number of moves after which a larger distance from the goal is accepted, and this larger distance
+in m.
 
-To come nearer, the robot would have to make another turn and another straight move.
+The robot could only come nearer with another turn and another straight move.
 """
 STRETCH: Final = 1.3
-"""Ratio of driven to requested length of a straight move, until the first measurement.
+"""Assumed ratio of driven to requested length of a straight move. A measurement of such a move
+replaces it.
 
-For example, 12 inches become 15.8 inches.
+For example, 12 requested inches become 15.8 driven inches.
 """
 DOCK_STRETCH: Final = 1.6
 """Largest assumed ratio of driven to requested length of a docking move.
@@ -39,15 +41,17 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""Increase of the allowed heading error for each turn since the last straight move.
+"""Factor for the increase of the allowed heading error. The error increases with each turn since
+the last straight move.
 
-It is a fraction of the initial allowed error. Turns overshoot, so without this increase the robot
-could turn back and forth.
+After ``turns`` turns, it is ``NEAR_RAD * (1 + WIDER * turns)``. Turns go too far, so without
+this increase the robot could turn back and forth.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
 
-The count begins anew if the driver stops a straight move that takes too long (``Move.cut``).
+If a straight move takes too long, the driver stops it, and counts the moves from zero again
+(``Move.cut``).
 """
 
 
@@ -64,7 +68,10 @@ class Surplus:
         self._learned: set[bool] = set()
 
     def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
-        """Learn from the measurement of a finished move. The signs of the values do not matter."""
+        """Learn from a finished move how much farther than requested the robot moves.
+
+        ``way_m``, ``turned_rad``: the measured distance and turn. Their signs do not matter.
+        """
         parts = request.data.split()
         slow, asked = b"SLOW" in parts, float(parts[-1])
         if request.word in (TF, TB):
@@ -77,19 +84,21 @@ class Surplus:
         self._degrees[slow] = min(MOST_SURPLUS_DEG, max(0.0, before + (beyond - before) / 2))
 
     def degrees(self, wanted: float, *, slow: bool) -> int:
-        """Return the degrees to request for a turn by ``wanted`` degrees.
+        """Return the degrees to request, so that the robot turns by ``wanted`` degrees.
 
-        The result is 0 if the turn would reduce the heading error by WORTH_DEG or less.
+        The result is 0 if the turn is not worthwhile: the heading error would become smaller by
+        WORTH_DEG or less.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
 
     def is_known(self, request: Request) -> bool:
-        """Return whether the distance or turn of a complete move is known.
+        """Return whether the driver knows how far a complete move of this kind goes.
 
-        A turn is always known, because the server ends a turn by its gyro. The server ends a
-        straight move by time, so the distance is known only after such a move was measured.
+        The angle of a turn is always known, because the server ends a turn by its gyro. The server
+        ends a straight move by time. So the distance of such a move is known only after one was
+        measured.
         """
         return request.word in (MCR, MCL) or (b"SLOW" in request.data.split()) in self._learned
 
@@ -116,14 +125,15 @@ def docking_inches(longest_m: float) -> int:
 class Move:
     """The progress towards the goal ``place``.
 
-    ``said``: number of moves sent that count towards MOST_MOVES; ``cut`` sets it to 0.
+    ``said``: number of sent moves that count towards the limit MOST_MOVES. ``cut`` sets it to 0.
 
     ``turns``: number of turns since the last straight move.
 
-    ``given_up``: whether the driver sends no further move, because the robot has arrived, or the
-    goal has failed.
+    ``given_up``: whether the driver sends no further move. The cause is that the robot has arrived,
+    or that the goal has failed.
 
-    ``failed``: whether a move has failed, or MOST_MOVES moves did not reach the goal.
+    ``failed``: whether the goal has failed: a move has failed, or MOST_MOVES moves did not reach
+    it.
     """
 
     place: Pose
@@ -137,10 +147,11 @@ class Move:
         self.given_up = self.failed = True
 
     def repeated(self) -> "Move":
-        """Return the ``Move`` to continue with when ``place`` is commanded again.
+        """Return the ``Move`` to continue with when the goal ``place`` is commanded again.
 
-        A goal in progress continues. A failed goal begins anew. If the robot has reached the goal,
-        it makes another straight move only if it is now more than ENOUGH_M (m) away from the goal.
+        If the goal is in progress, it continues. If the goal has failed, it begins anew. If the
+        robot has reached the goal, the robot may have been moved away since then. It makes another
+        straight move only if it is now more than ENOUGH_M (m) away from the goal.
         """
         if not self.given_up:
             return self
@@ -151,13 +162,13 @@ class Move:
     def cut(self) -> None:
         """Count moves and turns from 0 again, because a straight move took too long.
 
-        The driver has stopped this move. The move has not failed: the server needs more than one
-        straight move to a goal far away.
+        The driver has stopped this move, but the goal has not failed: the robot needs several
+        straight moves to reach a goal that is far away.
         """
         self.said = self.turns = 0
 
     def begin(self, request: Request) -> None:
-        """Count this move as sent."""
+        """Count the move that ``request`` begins."""
         self.said += 1
         self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 

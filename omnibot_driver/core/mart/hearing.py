@@ -2,7 +2,8 @@
 
 """What the pilot does when a reply comes, and when a reply does not come in time.
 
-This module knows states and replies; it does not know the next request. The caller passes the time.
+The pilot is the part of the driver that sends requests to the server. This module knows the pilot's
+states and the replies; it does not know the next request. The caller passes the time.
 """
 
 import math
@@ -19,11 +20,12 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that is accepted without a reply from the server.
+"""Largest relative change of the motors' units for which the driver does not need a reply from the
+server.
 
 The limit applies to a backward drive (B) in which the server reports no headings. If the server
-does not answer a larger change, the driver does not know how the robot turns. So it stops the
-robot.
+does not answer a change above the limit, the driver does not know how the robot turns. So it
+stops the robot.
 """
 
 
@@ -67,10 +69,10 @@ class Hearing(Measuring):
             self._answered(answer, now)
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether a reply after a stop command may be late: an older answer, or a copy.
+        """Return whether a reply that comes after a stop command may belong to an earlier request.
 
-        An older answer belongs to an earlier request. For example, it is the ``ok`` to the start of
-        the motion, or an encoder count.
+        For example, it may be the ``ok`` to the start of the motion, or an encoder count. It may
+        also be a copy of such a reply.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -104,9 +106,10 @@ class Hearing(Measuring):
             self._ask_s = max(self._ask_s, now + self._delay_s)  # earlier replies may still come
 
     def _hurry(self, now: float) -> None:
-        """Shorten the wait for a reply, because the server has already answered a later HELLO.
+        """Shorten the wait for a missing reply, because the server has answered HELLO.
 
-        The server answers in order, so the missing reply is lost or about to come.
+        This HELLO was sent later than the request whose reply is missing. The server answers in
+        order, so the missing reply is lost or about to come.
         """
         greeted_s = self._greeted_of_name(now)
         network = self.conversation
@@ -123,16 +126,17 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Time in s that an exchange takes now, from a request to its reply.
+        """Present time in s from a request to its reply, on this network.
 
-        It is estimated from the queries and the last check of the IMU.
+        It is estimated from the queries and from the last check of the IMU.
         """
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 
     def _greeted_of_name(self, now: float) -> float:
         """Return the earliest time at which the HELLO that was just answered may have been sent.
 
-        The result is minus infinity if this time is unknown.
+        The driver may have sent several HELLOs, and does not know which one was answered. The
+        result is minus infinity if the time is unknown.
         """
         longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self._trip_s)
         recent = [each for each in self._greetings if each >= now - longest_s]
@@ -140,9 +144,10 @@ class Hearing(Measuring):
         return recent[0] if recent else -math.inf
 
     def _named_in_a_move(self, now: float) -> None:
-        """Stop any motion, because the server answers HELLO although a move should keep it busy.
+        """Stop any motion, because the server has answered HELLO during a move.
 
-        The move's reply was lost, or the server was restarted.
+        A server that executes a move does not answer HELLO. So the move is over and its reply was
+        lost, or the server was restarted.
         """
         self._appears(now)
         self._moved_by = None

@@ -2,9 +2,9 @@
 
 """The angle of a controlled turn, as the server has recorded it in a file (LAST TURN).
 
-The public server never closes a file that it has sent. So it can send only about 1,000 files, and
-the driver downloads few. This module knows the form of the file; it does not know when the file is
-downloaded.
+The public server never closes a file after it has sent it. So it can send only about 1,000 files
+until it is restarted. For this reason, the driver downloads only a few. This module knows the form
+of the file; it does not know when the file is downloaded.
 """
 
 import re
@@ -13,13 +13,14 @@ from typing import Final
 from omnibot_driver.core.mart.words import Request
 
 SAME_DEG: Final = 0.5
-"""Largest accepted difference, in degrees, between two values of a turn's requested angle: the
-value in the turn's command, and the value in the file that records the turn."""
+"""Largest accepted difference, in degrees, between two angles: the requested angle in the
+command of a turn, and the requested angle in a file. If they differ more, the file belongs to
+another turn."""
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
-"""Limits of the sum of all angles that were read from records, in rad.
+"""Limits, in rad, for the sum of the turns that were read from records.
 
-From LEAST_RAD on, the driver uses the ratio of the motors' speeds that the records show. From
-ENOUGH_RAD on, it downloads no more records.
+When the sum reaches LEAST_RAD, the driver begins to use the ratio of the motors' speeds that the
+records show. When the sum reaches ENOUGH_RAD, it downloads no more records.
 """
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
@@ -34,7 +35,7 @@ _HEAD: Final = re.compile(
 
 
 class TurnRecords:
-    """The records of controlled turns, and the ratio of the motors' speeds that they have shown."""
+    """The records of controlled turns, and the ratio of the motors' speeds that they show."""
 
     def __init__(self) -> None:
         self._downloads = 0
@@ -42,7 +43,7 @@ class TurnRecords:
         self.forget()
 
     def connect(self) -> None:
-        """Begin a new connection, perhaps with another server."""
+        """Begin a new connection. The server may be another one than before."""
         self._failures, self._name = 0, ""
 
     def forget(self) -> None:
@@ -64,10 +65,10 @@ class TurnRecords:
         return self._told_rad / self._wheel_rad - 1.0 if self._told_rad >= LEAST_RAD else None
 
     def asked(self) -> None:
-        """Record that a download begins.
+        """Record that the driver begins to download a record.
 
-        The download is regarded as a failure until ``used`` reports that the odometry has used the
-        record.
+        At first, the download is counted as a failure. ``used`` clears the count of failures when
+        the odometry has used the record.
         """
         self._downloads += 1
         self._failures += 1
@@ -75,20 +76,26 @@ class TurnRecords:
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
         """Return the angle of a turn in degrees, with the server's sign, from the file of the turn.
 
-        ``name``, ``pieces``: name and content of the file. ``request``: the turn's command.
+        ``name``, ``pieces``: name and content of the file.
 
-        Return None if the file records another turn, or has no angle. Return None, too, if the
-        previous file had the same name: the server could not write a new file, and has sent the old
-        one again.
+        ``request``: the command of the turn.
+
+        The result is None if the file belongs to another turn, or has no angle. It is also None if
+        this file has the same name as the previous one: the server could not write a new file, and
+        has sent the old file again.
         """
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)
 
     def used(self, told_rad: float, wheel_rad: float) -> None:
-        """Receive a recorded turn that the odometry has used, to compute the ratio of the motors.
+        """Receive a recorded turn that the odometry has used.
 
-        ``told_rad``: the turn according to the record. ``wheel_rad``: the part of the turn that the
-        right wheel has caused. With equal motors, this is half of the turn.
+        The ratio of the motors' speeds is computed from such turns.
+
+        ``told_rad``: the angle of the turn in the record.
+
+        ``wheel_rad``: the part of this angle that comes from the motion of the right wheel. With
+        equal motors, it is half of the angle.
         """
         self._failures = 0
         self._told_rad += abs(told_rad)
@@ -105,8 +112,11 @@ class TurnRecords:
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
     """Return the angle of a turn in degrees, with the server's sign, from the file of the turn.
 
-    ``pieces``: content of the file. ``request``: the turn's command. Return None if the file
-    records another turn or has no angle.
+    ``pieces``: content of the file.
+
+    ``request``: the command of the turn.
+
+    The result is None if the file belongs to another turn, or has no angle.
     """
     for piece in pieces:  # the angle is in the first piece, so a later piece may be lost
         if head := _HEAD.match(piece):

@@ -29,30 +29,31 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""A change between two readings can be a spike only if it is larger than the largest recent change
-times this factor."""
+"""Factor for the largest recent change between two readings. Only a change that is larger than
+this factor times the largest recent change can be a spike."""
 CALMING: Final = 0.95
-"""Factor by which the stored largest recent change shrinks with each reading. After 20 readings, a
-third of it is left."""
+"""Factor by which ``_restless``, the largest recent change, is reduced with each reading. After
+20 readings, a third of it is left."""
 STILL: Final = 0.08
 """Largest fraction of a spike that remains in the next IMU reading. If more than this fraction of
 an implausible change remains, the change was not a spike.
 
-The fraction has a second use: it shows whether only one value of a reading has changed. This is
-so if all other values change by at most this fraction of the largest change.
+This fraction is also used to find out whether only one value of a reading has changed. Then all
+other values have changed by at most this fraction of the largest change.
 """
 END_OF_SCALE: Final = 0.99996
-"""Fraction of the accelerometer's full scale from which on a reading is regarded as at the end of
-the scale. The largest positive reading of 16 bits is just above this fraction."""
+"""Fraction of the accelerometer's full scale. A reading of at least this fraction is regarded as
+at the end of the scale. The largest positive reading of 16 bits is just above the fraction."""
 MOST_HELD: Final = 10
-"""Largest number of readings that are held: a displacement that changed implausibly much, and the
-poses after it."""
+"""Largest number of readings that the filter holds. The first of them is a displacement that
+changed implausibly much. The others are the poses after it."""
 ALIKE: Final = 2.0
 """Largest ratio between the durations of two successive displacements. If the ratio is larger,
-the filter does not compare the two, because even a steady motion would then seem to change."""
+the filter does not compare the two displacements. Otherwise, even a steady motion would look
+like a change."""
 BACK: Final = 0.25
-"""Largest fraction of a spike that remains in the next displacement. If more than this fraction
-of an implausible change remains, the change was not a spike."""
+"""Largest fraction of a displacement's spike that remains in the next displacement. If more than
+this fraction of an implausible change remains, the change was not a spike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,13 +86,15 @@ class Refused:
 class OutlierFilter:
     """Rejects implausible readings.
 
-    A reading that leaps may be a spike, so the filter holds it until the next reading arrives.
+    A reading that changes implausibly much may be a spike. So the filter holds it until the next
+    reading arrives.
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: whether the board corrects its own odometry. If so, the filter does not reject
-      an impossible but finite displacement. It passes the displacement on with ``measured`` False.
-      If the duration of the displacement is known and not 0, ``possible`` is False, too.
+    * ``corrected``: whether the board corrects its own odometry. A correction can look like an
+      impossible motion. So if this is True, the filter does not reject an impossible but finite
+      displacement. It passes the displacement on, with ``measured`` set to False. If the duration
+      of the displacement is known and not 0, it also sets ``possible`` to False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -101,18 +104,21 @@ class OutlierFilter:
         self._imu_leaps = _Spikes(STILL, knocked=3)
         self._motion_leaps = _Spikes(BACK, knocked=0)
         self._lasted_s = 0.0
-        """Duration in s of the last displacement whose duration was known and not 0."""
+        """Duration in s of the previous displacement. Displacements with an unknown duration or
+        a duration of 0 do not change this value."""
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
-        """A displacement that changed implausibly much, and the poses after it."""
+        """The readings that the filter holds: a displacement that changed implausibly much, and
+        the poses after it."""
         self._displaced_at_s: float | None = None
         self._lost = 0
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Add a reading; return the readings that need not wait any longer.
+        """Add a reading; return all readings that the filter now passes on.
 
-        A reading that need not wait is returned at once. Readings of the same kind stay in order.
+        The filter passes a reading on at once, unless the reading or an earlier one may be a spike.
+        Such readings are held. Readings of the same kind stay in order.
         """
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
@@ -135,9 +141,9 @@ class OutlierFilter:
         return [(self._told_of_losses(reading), stamp_s)]
 
     def release(self) -> list[Stamped]:
-        """Return the waiting readings, because the stream has ended or paused.
+        """Return the readings that the filter holds, because the stream has ended or paused.
 
-        No later reading can show that they are spikes.
+        Only a later reading could show that a held reading is a spike, and there is no later one.
         """
         released = [*self._held_imu, *self._held_motion]
         self._held_imu, self._held_motion = [], []
@@ -146,7 +152,7 @@ class OutlierFilter:
         return released
 
     def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
-        """Add an IMU reading; return the IMU readings whose wait is over, in order."""
+        """Add an IMU reading; return, in order, the IMU readings that need not be held now."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
@@ -213,7 +219,7 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; in a pose, ``lost`` also counts the rejected displacements.
+        """Return the reading. If it is a pose, ``lost`` also counts the rejected displacements.
 
         The pose includes the motion of these displacements, so their motion is not lost.
         """
@@ -223,9 +229,9 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """Return the reading with ``lost``, ``duration_s`` and ``restarted`` corrected.
+        """Return the reading with corrected values of ``lost``, ``duration_s`` and ``restarted``.
 
-        The corrections account for the rejected displacements before this reading.
+        The corrections are necessary because displacements before this reading were rejected.
         """
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
@@ -239,13 +245,14 @@ class OutlierFilter:
 
 
 class _Spikes:
-    """Finds spikes in a series of readings, each of which is a list of values.
+    """Finds spikes in a series of readings. Each reading is a list of values.
 
-    The unit of each value is the change that is always allowed between two readings.
+    Each value is given in units of a change that is always allowed between two readings.
 
     * ``left``: largest fraction of a spike that remains in the next reading.
-    * ``knocked``: number of values at the beginning of the list that may leap when the robot is
-      knocked. A leap of such a value may be a spike only if one flipped bit explains the leap.
+    * ``knocked``: number of values, from the beginning of the list, that can change implausibly
+      much because something knocks against the robot. Such a change may be a spike only if one
+      flipped bit explains it.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -254,7 +261,7 @@ class _Spikes:
         self.forget()
 
     def forget(self) -> None:
-        """Forget earlier readings, because later readings are unrelated to them."""
+        """Forget all readings until now, because the next ones are unrelated to them."""
         self._sure: Sequence[float] | None = None
         self._leaping: Sequence[float] | None = None
         self._restless = 0.0
@@ -262,11 +269,14 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Return whether the previous values were a spike, and whether the new ones leap.
+        """Return whether the previous values were a spike, and whether the new values leap.
 
-        ``periods``: number of sampling periods since the previous values.
+        Values leap if they change implausibly much. The next values show whether they are a spike.
 
-        ``topmost_bit``: value of the highest bit of the accelerations, scaled like ``values``.
+        ``periods``: number of sampling periods between the previous and the new values.
+
+        ``topmost_bit``: value of the highest bit of the accelerations, in the same units as
+        ``values``.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False
@@ -296,12 +306,13 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether one flipped bit can explain the step of a value.
+        """Return whether one flipped bit can explain a change.
 
-        The value of the bit may differ from the step by the recent variation of the readings.
+        ``step``: size of the change. It need not be exactly the value of a bit, because the
+        readings vary: the recent variation is tolerated.
 
-        ``value``: magnitude after the step. If the magnitude is at the end of the scale, the result
-        is False, because a knock against the robot can cause such a value, too.
+        ``value``: magnitude after the change. If it is at the end of the scale, the highest bit
+        does not count, because a knock against the robot can also cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -2,8 +2,9 @@
 
 """The motion monitor: compares the robot's displacements with its set-points.
 
-Velocities are in the board's own axes, times on the clock of the stamps. This module knows neither
-bytes nor how a robot is stopped. docs/internals/motion_monitor.md explains the thresholds.
+Velocities are in the board's own axes. Times are on the same clock as the stamps. This module does
+not know bytes, and does not know how a robot is stopped. docs/internals/motion_monitor.md explains
+the thresholds.
 """
 
 import math
@@ -22,8 +23,8 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s that a robot may need to stop after a command to stand still. During this time, its
-motion is not regarded as motion without a command."""
+"""Time in s in which a robot may still move after it was commanded to stand still. This motion
+is not regarded as motion without a command."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -34,7 +35,7 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time in s for which a robot must stand still to prove that it has obeyed Stop.
+"""Time in s. A robot that stands still for this time after Stop has obeyed Stop.
 
 If the robot moves later, the cause is not a lost Stop but, for example, a push.
 """
@@ -70,7 +71,7 @@ STOPPED: Final = frozenset(
         Fault.BEYOND_LIMITS,
     }
 )
-"""Faults of a driven robot after which the robot must be stopped."""
+"""Faults for which a robot that is commanded to move must be stopped."""
 ADVICE: Final[Mapping[Fault, str]] = {
     Fault.WRONG_WAY: "check the wiring of the wheels",
     Fault.WRONG_TURN: "check the wiring of the wheels",
@@ -91,8 +92,8 @@ ADVICE: Final[Mapping[Fault, str]] = {
 class MotionMonitor:
     """Compares the motion of one robot with its commands.
 
-    * ``commanded``, ``measured``: the two twists at the last time when the robot moved too fast or
-      the wrong way.
+    * ``commanded``, ``measured``: the commanded and the measured twist when the last fault "too
+      fast" or "wrong way" was found.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -128,24 +129,25 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board has an e-stop of its own, which may still hold the robot. So until the robot moves
-        as commanded, a robot that does not obey a motion command has the fault HELD_BY_ESTOP, not
-        BLOCKED.
+        The board has an e-stop of its own, which may still hold the robot. So a robot that does not
+        obey motion commands now has the fault HELD_BY_ESTOP. After the robot has moved as
+        commanded, such a robot has the fault BLOCKED again.
         """
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Return whether ``fault`` is the first of its kind since the robot moved as commanded.
+        """Return whether ``fault`` is new since the robot last moved as commanded.
 
-        The fault is recorded, so the next call returns False.
+        This call records the fault, so the next call with the same fault returns False.
         """
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 
     def count_refused(self, count: int, now: float) -> Fault | None:
-        """Return the fault that four rejected displacements in a row show, or None.
+        """Return a fault if four displacements in a row were rejected, otherwise None.
 
-        ``count``: displacements that the outlier filter has rejected since the driver began.
+        ``count``: number of displacements that the outlier filter has rejected since the driver
+        began.
         """
         self._refused = count
         if count < self._refused_before + REFUSED_IN_A_ROW:
@@ -154,11 +156,12 @@ class MotionMonitor:
         return self._exceed(now)
 
     def count_impossible(self, now: float) -> Fault | None:
-        """Return the fault that four impossible displacements in a row show, or None.
+        """Return a fault if this is the fourth impossible displacement in a row, otherwise None.
 
-        If the board may have corrected its own odometry, the outlier filter does not reject an
-        impossible displacement. Call this method for such a displacement, instead of ``check``.
-        Fewer than four in a row are regarded as corrections of the board's odometry.
+        Call this method instead of ``check`` for an impossible displacement of a board that
+        corrects its own odometry. The outlier filter passes such a displacement on, because it may
+        be a correction. Up to three in a row are regarded as corrections. Four show that the robot
+        is really too fast.
         """
         self._error.reset()
         self._impossible += 1
@@ -168,7 +171,7 @@ class MotionMonitor:
         return self._exceed(now)
 
     def disregard_refused(self, count: int) -> None:
-        """Record how many displacements were rejected so far, without looking for a fault.
+        """Record the number of displacements that were rejected until now. Do not look for a fault.
 
         This method is called while the robot is not monitored.
         """
@@ -206,7 +209,8 @@ class MotionMonitor:
     def _exceed(self, now: float) -> Fault | None:
         """Return the fault of a robot that is faster than its physical limits.
 
-        Return None if the robot may still be slowing down after a fault.
+        The result is None if a fault was found a short time ago, because the robot may then still
+        be slowing down.
         """
         history = self._history
         if history.current is None or history.driven(now - LAG_S):
@@ -214,10 +218,9 @@ class MotionMonitor:
         return Fault.UNCOMMANDED if history.known(now) else None
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """Return ``fault``, and suspend the checks.
+        """Return ``fault``, and suspend the checks, because the robot may still be slowing down.
 
-        They are resumed 0.8 s (``UNKNOWN_S``) after the next set-point. Until then, the robot may
-        still be slowing down.
+        The checks begin again 0.8 s (``UNKNOWN_S``) after the next set-point.
         """
         self._error.reset()
         self._history.add(None, now)
@@ -226,10 +229,10 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot whose motion does not fit its commands.
 
-        Such a robot is either too fast, or moves in the wrong direction. A linear velocity is
-        regarded as too fast if it is within 60° of a set-point's direction, or if the heading is
-        not known. A yaw rate is regarded as too fast if it has the same sign as a set-point's yaw
-        rate.
+        Such a robot is too fast, or it moves in the wrong direction. The linear velocity is too
+        fast if its direction is within 60° of a set-point's direction, or if the heading is
+        unknown. Otherwise its direction is wrong. The yaw rate is too fast if it has the same sign
+        as a set-point's yaw rate. Otherwise its direction is wrong.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -242,11 +245,11 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
+        """Return UNCOMMANDED if the robot moves without a command, and Stop is due; otherwise None.
 
-        ``begins``: whether the following error exceeds its limit. The first Stop is due when this
-        is True. If the robot continues to move, for example because somebody pushes it, Stop is due
-        again after ever longer times.
+        ``begins``: whether the following error exceeds its limit now. If it does, the first Stop is
+        due. The robot may continue to move, for example because somebody pushes it. Then Stop is
+        due again, after longer and longer times.
         """
         if not self._error.outside:
             self._stood_s += seconds

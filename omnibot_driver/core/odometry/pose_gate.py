@@ -19,46 +19,47 @@ BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
 with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
 
-The limits are larger after displacements were lost: the possible motion of these displacements
-is added until a pose has shown their motion.
+If displacements were lost, the driver adds their possible motion to both limits. It does so
+until an accepted pose includes this motion.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
-"""``FARTHEST_M``, ``FARTHEST_RAD``: limits of a plausible pose, in m and rad. A pose beyond 100 km
-or 16,000 turns comes from misread bytes."""
+"""``FARTHEST_M``, ``FARTHEST_RAD``: limits of a plausible pose, in m and rad. If a pose is
+beyond 100 km or 16,000 turns, its bytes were misread."""
 
 
 class PoseGate:
     """Decides which poses of the board are accepted.
 
-    * ``proved``: the last accepted pose; None if there is no valid one.
-    * ``doubted``: the unexpected pose that the next pose must confirm, moved along with the robot;
-      None if there is none.
+    * ``proved``: the last accepted pose; None if there is none.
+    * ``doubted``: the last unexpected pose, which the next pose must confirm. Each later motion of
+      the robot is added to it. None if there is no such pose.
     """
 
     def __init__(self) -> None:
         self.refused = 0
-        """Number of poses that were impossible, or unexpected and not confirmed by the next one."""
+        """Number of rejected poses. A pose is rejected if it is impossible. It is also rejected
+        if it is unexpected and the next pose does not confirm it."""
         self.proved: Pose | None = None
         self.doubted: Pose | None = None
         self._unproved_s = 0.0
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Move the unconfirmed pose ``doubted`` along with a reported motion of the robot."""
+        """Add a reported motion of the robot to the unconfirmed pose ``doubted``."""
         if self.doubted is not None:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Move the unconfirmed pose ``doubted`` by the motion that is assumed for a gap.
+        """Add the motion during a gap to the unconfirmed pose ``doubted``.
 
-        ``chord``: this motion, in the axes of ``doubted``.
+        ``chord``: the motion that the driver assumes for the gap, in the axes of ``doubted``.
         """
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """Record that the robot may have moved for ``seconds``, by the board's clock."""
+        """Add ``seconds``, by the board's clock, to the time in which the robot may have moved."""
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
@@ -68,13 +69,13 @@ class PoseGate:
         return possible
 
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether the new pose ``told`` agrees with ``doubted``, the last unexpected pose.
+        """Return whether the new pose ``told`` confirms ``doubted``, the last unexpected pose.
 
-        If there is no ``doubted`` pose, the result is False. If the two poses do not agree,
-        ``doubted`` is counted as refused. After this call, there is no ``doubted`` pose.
+        The result is False if there is no ``doubted`` pose. If the two poses do not agree,
+        ``doubted`` is counted as rejected. After this call, there is no ``doubted`` pose.
 
-        ``gap``: covariance of the motion of lost displacements that no pose has shown yet. It
-        increases the tolerated difference.
+        ``gap``: covariance of the motion that was lost since the last accepted pose. It increases
+        the tolerated difference.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)
@@ -86,11 +87,11 @@ class PoseGate:
         self.proved, self.doubted, self._unproved_s = board, None, 0.0
 
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
-        """Return whether the robot can have reached a pose since the last accepted one.
+        """Return whether the robot can have reached the pose ``told`` since the last accepted pose.
 
         The result is False if no pose was accepted yet.
 
-        ``seconds``: time in s in addition to the time that ``passed`` has recorded.
+        ``seconds``: time in s that is added to the time recorded with ``passed``.
 
         ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.
         """
@@ -105,11 +106,11 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether rounding or lost displacements can explain a pose's deviation.
+    """Return whether rounding or lost displacements can explain the deviation of a pose.
 
-    ``way``: the deviation from the expected pose.
+    ``way``: the difference between this pose and the expected pose.
 
-    ``gap``: covariance of the motion of the displacements that were lost since the last pose.
+    ``gap``: covariance of the motion that the lost displacements since the last pose may contain.
     """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS

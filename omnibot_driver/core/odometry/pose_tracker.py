@@ -2,9 +2,9 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-Inputs are tangents (twist x time) as the board reports them: in the board's axes, computed with
-assumed wheel sizes. Outputs are in REP-103's axes, with true distances and turns. This module does
-not know which of the board's reports are right.
+The inputs are tangents (twist x time) that the board reports. They are in the board's axes, and the
+board computes them with assumed wheel sizes. The outputs are in REP-103's axes, with true distances
+and turns. This module does not know which of the board's reports are right.
 """
 
 from typing import Final
@@ -15,7 +15,7 @@ from omnibot_driver.core.odometry.correction_smoother import CorrectionSmoother
 from omnibot_driver.core.odometry.covariance import NOTHING, OdometryNoise, Uncertainty
 
 Factors = tuple[float, float, float]
-"""Factors for x, y and yaw."""
+"""Factors by which x, y and yaw are multiplied."""
 AS_TOLD: Final[tuple[float, ...]] = (1.0, 1.0, 1.0)
 
 
@@ -27,8 +27,8 @@ class PoseTracker:
 
     def __init__(self, axis_signs: Signs) -> None:
         self.rolled = Pose()
-        """Sum of the tangents of all motions since the driver began, in the board's axes, but with
-        true distances and turns."""
+        """Sum of the tangents of all motions since the driver began. It is in the board's axes,
+        but corrected to true distances and turns."""
         self._axis_signs = axis_signs
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(OdometryNoise())
 
@@ -62,19 +62,20 @@ class PoseTracker:
         return _times(tangent, self._signed_size).over(seconds), rolling
 
     def way_to(self, place: Pose) -> Pose:
-        """Return the tangent from the robot's pose to ``place``, by the shorter turn.
+        """Return the tangent from the robot's pose to ``place``.
 
-        A tangent is twist x time. Like the tangents that the board reports, the result is in the
-        board's body axes and not corrected by ``scale``.
+        A tangent is twist x time. The robot would turn in the direction with the smaller angle. The
+        result can be compared with the tangents that the board reports: it is in the board's body
+        axes and not corrected by ``scale``.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
 
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Move along a tangent (twist x time) that took ``seconds``.
+        """Move along a tangent (twist x time). The motion took ``seconds``.
 
-        ``stamped_s``: time between the stamps before and after the motion, in s. It limits the step
-        of the published pose.
+        ``stamped_s``: time in s from the stamp before the motion to the stamp after it. The
+        published pose moves at most as far as the robot can move in this time.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -85,15 +86,18 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the motion during a gap, which a pose of the board has shown.
+        """Add the motion during a gap. A pose of the board has shown this motion.
 
-        ``tangent``: this motion. The best pose moves at once. The published pose follows it, but
-        not faster than the robot could move.
+        ``tangent``: the motion during the gap. The best pose moves at once. The published pose
+        follows the best pose, but not faster than the robot could move.
         """
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
-        """Correct the pose gradually by ``tangent``, and remove the uncertainty of all gaps."""
+        """Correct the pose by ``tangent``. The published pose takes up this correction gradually.
+
+        The uncertainty of all gaps until now is removed.
+        """
         if self.uncertainty.gap != NOTHING:  # else the tangent is only rounding
             self.rolled += _times(tangent, self._size)
         self.follower.correct(roll(_times(tangent, self._signed_size)))

@@ -15,9 +15,11 @@ TICK_S: Final = 0.01
 """Period of the board's control loop in s; the board sends one IMU frame in each period."""
 POSE_PERIOD_S: Final = 0.2
 DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
-"""Possible periods of the deltas in s: multiples of a tick that divide the period of the poses."""
+"""Possible periods of the deltas in s. Each is a multiple of a tick, and the period of the poses
+is a multiple of it."""
 DELTAS_MISSING: Final = 6
-"""Number of missing deltas after which the board is assumed to be in IMU-only mode."""
+"""If this number of deltas in a row does not arrive, the board is assumed to be in IMU-only
+mode."""
 FEWEST_ALONE: Final = 25
 """Smallest number of IMU frames in a row, without a delta, that shows IMU-only mode.
 
@@ -40,7 +42,8 @@ class Schedule:
         self.imus_per_delta = round(delta_period_s / TICK_S)
         self.deltas_per_pose = round(POSE_PERIOD_S / delta_period_s)
         self.imus_alone = max(FEWEST_ALONE, DELTAS_MISSING * self.imus_per_delta + 1)
-        """Number of IMU frames in a row, without a delta, that shows IMU-only mode."""
+        """If this number of IMU frames arrives in a row without a delta between them, the board
+        is in IMU-only mode."""
         self.bytes_per_s = _IMU_BYTES_PER_S + _DELTA_BYTES / delta_period_s + _POSE_BYTES_PER_S
         self.rates_hz: dict[RateName, float] = {
             "IMU": 1.0 / TICK_S,

@@ -19,19 +19,20 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Mean delay in s above which reads are reported as late. An adapter that delivers bytes every
-10 ms just reaches this limit: its mean delay is 5 ms."""
+"""Mean delay of reads, in s. If the mean delay is larger, the reads are reported as late. An
+adapter that delivers bytes every 10 ms has a mean delay of 5 ms, and is just not reported."""
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
-"""Time in s for which one arrival time affects the estimated clock skew.
+"""Time in s after which an arrival time no longer affects the estimated difference of the clocks'
+rates.
 
-A skew that lasts for a shorter time may come from a busy computer, so it is not reported.
+A difference that lasts for a shorter time may come from a busy computer, so it is not reported.
 """
 
 BUSY_SHARE: Final = 0.1
-"""Share of time, from 0 to 1, for which the reader waits for the processor. Above this share, the
-computer is reported as too busy."""
+"""Share of time, from 0 to 1. If the reader thread waits for the processor for a larger share of
+the time, the computer is reported as too busy."""
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
 """Label of the rate at which the driver publishes odometry. The label "Odometry rate (Hz)" is for
@@ -48,7 +49,7 @@ readings of that kind."""
 class Diagnosis:
     """The diagnosis of one board, made about once a second from recent figures.
 
-    * ``to_check``: what to check if no valid data comes.
+    * ``to_check``: what the user should check if no valid data comes from the board.
     """
 
     def __init__(self, to_check: str) -> None:

@@ -14,11 +14,12 @@ from random import Random
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkFaults:
-    """Faults of a network, per datagram and in both directions.
+    """Faults of a network. They apply to each datagram, in both directions.
 
-    lose, duplicate: probabilities.
-    delay_s: longest delay in s. Each datagram and each duplicate has its own random delay from 0 to
-        this value, so the order may change.
+    lose, duplicate: probabilities that a datagram is lost or duplicated.
+
+    delay_s: longest delay in s. Each datagram and each duplicate has its own random delay, from 0
+    to this value. So the order of the datagrams may change.
     """
 
     lose: float = 0.0
@@ -72,7 +73,7 @@ class NetworkPath:
 
 
 class FaultyNetwork:
-    """Both directions of one channel, with equal faults and separate random numbers."""
+    """Both directions of one channel, with equal ``NetworkFaults`` and separate random numbers."""
 
     def __init__(self, faults: NetworkFaults = _GOOD, seed: int | str = 0) -> None:
         self.to_board = NetworkPath(faults, f"to board {seed}")

@@ -31,13 +31,14 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``wanted_deg``: angle that the steered wheel must reach; None before the first ``rc`` command.
 
-    The caller simulates faults of the angle sensor with these attributes:
+    A test or user simulates faults of the angle sensor with the other attributes:
 
-    ``diagnosis``, ``error_flags``: status bits in the ``fwl`` line, without the frame counter.
+    ``diagnosis``, ``error_flags``: status bits that the ``fwl`` line reports. They do not include
+    the frame counter.
 
     ``frozen``: whether the sensor repeats its last angle.
 
-    ``absent``: whether no sensor answers. The Teensy then reports the angle 0 and the status bits
+    ``absent``: whether no sensor answers. If so, the Teensy reports the angle 0 and the status bits
     of a sensor that has not finished its first measurement.
     """
 
@@ -78,7 +79,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # Each cycle
 
     def cycle(self) -> None:
-        """Measure the angle, stop the lift when its commanded time has passed, and steer."""
+        """Run one cycle: measure the angle, stop the lift if its time is over, and steer."""
         self._measured_deg = self._measure()
         if self.hung:
             return
@@ -118,9 +119,9 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What the Teensy sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return, for each line that the host can request, the function that writes the line.
+        """Return a function for each line that the host can request. The function writes this line.
 
-        The keys are the lines' names in the help text.
+        The keys are the names of the lines, as in the help text.
         """
         return super().items() | {
             "hbt": lambda: (
@@ -206,9 +207,10 @@ class FrontTeensy(Teensy[FrontConfig]):
         }
 
     def _remote_control(self, rest: str) -> None:
-        """Set the angle that the wheel must reach, ``atan2(F w, v)``, limited to ±90°.
+        """Set the angle that the wheel must reach. It is ``atan2(F w, v)``, limited to ±90°.
 
-        ``v``, ``w``: commanded speed and turn rate. ``F``: distance from the axle to the wheel.
+        ``v``, ``w``: commanded speed and turn rate. ``F``: distance from the axle to the front
+        wheel.
         """
         _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)

@@ -2,7 +2,8 @@
 
 """The commands that do not start a motion: queries, clock, log, files, direct motor control.
 
-This module knows their replies and delays; it does not know how commands are recognised.
+This module knows the replies to these commands, and when they come. It does not know how the server
+recognises a command.
 """
 
 import calendar
@@ -31,9 +32,9 @@ Handler = Callable[["MartServer", str], str | None]
 def missing(server: "MartServer", what: str) -> str | None:
     """Refuse a command that has too few numbers.
 
-    With the quirk ``crashes_on_missing_numbers``, end the server instead.
+    If the server has the quirk ``crashes_on_missing_numbers``, it ends instead.
 
-    ``what``: the reason why the server ends.
+    ``what``: the reason that is recorded if the server ends.
     """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
@@ -91,7 +92,7 @@ def _tell_encoder(server: "MartServer") -> None:
 
 
 def motor_status(server: "MartServer", text: str) -> str | None:
-    """Answer MCSTAT with the status bits of the motor board, or with 255 if it is silent."""
+    """Answer MCSTAT with the status bits of the motor board. If the board is silent, answer 255."""
     _ask_board(server, _tell_status)
     return None
 
@@ -133,8 +134,8 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 def take_bias(server: "MartServer", text: str) -> str | None:
     """Measure the gyro bias (SB).
 
-    If the server has stopped using the IMU, it first opens the IMU. SB fails if the IMU does not
-    answer then.
+    If the server has stopped using the IMU, it opens the IMU before the measurement. If the IMU
+    does not answer at this time, SB fails.
     """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
@@ -262,7 +263,7 @@ def set_motors(server: "MartServer", text: str) -> str | None:
 
 
 def stop_motors(server: "MartServer", text: str) -> str | None:
-    """Handle the command MSM: stop the motors if MCS (direct control) has started them."""
+    """Handle the command MSM. It stops the motors if the command MCS has set their registers."""
     if server.manual:
         server.manual = False
         server.drive(128, 128)

@@ -41,9 +41,9 @@ _NOTHING: Final[Step] = (b"", None, False)
 
 
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames by counting seven bytes after FF FE, without a timeout.
+    """Find frames: a frame is FF FE and the seven bytes after it. There is no timeout.
 
-    In FF FF FE, the last two bytes are recognised as a header.
+    In the bytes FF FF FE, the last two are recognised as the header of a frame.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
@@ -53,9 +53,10 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does; but if another byte than FE follows FF, discard both bytes.
+    """Find frames as ``counting`` does, with one difference in the handling of FF.
 
-    As a result, the header in FF FF FE is missed.
+    If the byte after FF is not FE, both bytes are discarded. As a result, the header in the bytes
+    FF FF FE is missed.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
@@ -73,7 +74,7 @@ def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
 def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
-    Accepted bytes are searched again, so frames can overlap.
+    The bytes of an accepted frame can also belong to the next frame, so frames can overlap.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -95,10 +96,10 @@ FRAMINGS: Final[dict[FramingName, Framing]] = {
 class ReceiverKind:
     """Selects the behaviour of the receiver.
 
-    * ``framing``: how control frames are found.
-    * ``letters``: where state letters act: between control frames, or anywhere.
-    * ``wakes_while_booting``: whether bytes that arrive during the boot wake the receiver. If not,
-      these bytes are lost.
+    * ``framing``: how the receiver finds control frames.
+    * ``letters``: where the receiver obeys state letters: only between control frames, or anywhere.
+    * ``wakes_while_booting``: whether the receiver wakes from bytes that arrive during the boot. If
+      not, it ignores these bytes.
     """
 
     framing: FramingName = "counting"
@@ -114,7 +115,8 @@ class CommandReceiver:
 
     * ``held``: received bytes that may be the beginning of a frame.
     * ``last_at_s``: arrival time of the last byte that could belong to a control frame.
-    * ``to_swallow``: number of wake-up bytes still expected.
+    * ``to_swallow``: number of bytes that are still needed to wake the receiver. These bytes are
+      lost.
     """
 
     def __init__(self, kind: ReceiverKind = COUNTING, *, awake: bool = False) -> None:
@@ -126,14 +128,18 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """Process a byte that arrives during the boot: it is lost, or it is a wake-up byte."""
+        """Process a byte that arrives during the boot.
+
+        If the receiver can wake during the boot, the byte is a wake-up byte. Otherwise it is lost.
+        """
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
         """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        If ``control_frames`` is false, each byte can be a state letter, but never part of a frame.
+        If ``control_frames`` is false, the receiver looks only for state letters, and for no
+        frames.
         """
         if self.to_swallow:
             self.to_swallow -= 1

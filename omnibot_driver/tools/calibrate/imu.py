@@ -59,7 +59,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
     """Return the result to show and to save.
 
-    ``imu``: the readings without the driver's correction of the biases.
+    ``imu``: the readings from which the driver has not subtracted the biases.
 
     ``now``: the driver's parameters before the calibration.
     """

@@ -19,10 +19,11 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A control law: a function of the time in s and the unwrapped pose, both since the start.
+"""A control law: a function that returns the command, or None to end the motion.
 
-It returns the command, or None to end the motion. A ``cmd_vel`` is in m/s, m/s and rad/s, a
-``wheel_cmd`` in rad/s.
+Its arguments are the time in s since the start of the motion, and the pose relative to the start.
+The yaw of this pose is not wrapped. The command of ``cmd_vel`` is in m/s, m/s and rad/s. The
+command of ``wheel_cmd`` is in rad/s.
 """
 
 LOOK_S: Final = 1.0
@@ -30,16 +31,17 @@ LOOK_S: Final = 1.0
 SLOW_LOOK_S: Final = 3.0
 """Time, in s, that replaces ``LOOK_S`` if the board rarely measures its motion.
 
-Between two measurements, the odometry is only predicted, so a longer time is needed.
+Between two measurements of such a board, the driver only predicts the odometry. So the tool must
+compare for a longer time.
 """
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Speeds below which the tool does not check that the robot moves.
+"""Commanded speeds. If a command is slower, the tool does not check that the robot moves.
 
-Friction may prevent such slow motions. For ``cmd_vel``: a linear speed in m/s and a yaw rate in
-rad/s. For ``wheel_cmd``: rad/s.
+Friction may prevent such slow motions. For ``cmd_vel``, the values are a linear speed in m/s and a
+yaw rate in rad/s. For ``wheel_cmd``, they are in rad/s.
 """
 
 
@@ -127,13 +129,14 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Add the commanded and the measured motion since the last call, and compare the sums.
+        """Add the motion since the last call to the sums of commanded and measured motion.
 
-        The sums cover 1 s, or 3 s if the board rarely measures its motion. Raises ToolError if the
-        robot moved by less than a fifth of the commanded motion. Commands slower than ``PLAIN`` are
-        not checked.
+        Compare the sums after 1 s, or after 3 s if the board rarely measures its motion. Raises
+        ToolError if the measured motion is less than a fifth of the commanded motion. Commands
+        slower than ``PLAIN`` are not checked.
 
-        ``seconds``: time since the last call. ``measured``: in the units of ``command``.
+        ``seconds``: time since the last call. ``measured``: measured velocity, in the units of
+        ``command``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

@@ -56,8 +56,9 @@ class Feed:
     """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
 
     Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
-    ``dead_man``: dead man's switch. If given, the monitor publishes ``cmd_vel`` while a key is
-    held.
+
+    ``dead_man``: the dead man's switch, with which the user drives the robot. With this switch, the
+    monitor publishes ``cmd_vel`` while a key is held. None if the monitor must not move the robot.
     """
 
     def __init__(
@@ -95,7 +96,7 @@ class Feed:
         self._spinner.start()
 
     def close(self) -> None:
-        """Stop the robot if this monitor has steered it, and end the connection."""
+        """End the connection. If this monitor has moved the robot, stop the robot before."""
         if self.dead_man:
             self.dead_man.stop()
         self._ending.set()
@@ -139,7 +140,10 @@ class Feed:
     # Actions of the user
 
     def estop(self) -> None:
-        """Latch the e-stop by topic and by service. Repeat both until the driver confirms."""
+        """Latch the e-stop by a message on the topic and by a call of the service.
+
+        Repeat both until the driver confirms that the e-stop is latched.
+        """
         if self.dead_man:
             self.dead_man.stop()
         self._model.estop_asked = True
@@ -188,9 +192,9 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Read the driver's parameters after each change of state.
+        """Read the driver's parameters. This is done again after each change of the driver's state.
 
-        After such a change, another driver may run under the same name.
+        The reason: after such a change, another driver may run under the same name.
         """
         if self._learned or not (self._list.service_is_ready() and self._ask.service_is_ready()):
             return
@@ -203,9 +207,10 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """Return those of ``imu``, ``start`` and ``pause`` that this driver's board does not have.
+        """Return what this driver's board lacks: a subset of ``imu``, ``start`` and ``pause``.
 
-        A name is left out as long as the monitor does not know whether the board has this.
+        While the monitor does not know whether the board has one of them, the result does not
+        contain it.
         """
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():

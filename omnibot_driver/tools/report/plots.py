@@ -39,12 +39,15 @@ LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""Range of a timing plot, as a multiple of the 99 % quantile of its values. Values beyond the range
-are drawn at the edge."""
+"""Range of a timing plot: this factor times the value below which 99 % of the plotted magnitudes
+lie. Values beyond the range are drawn at the edge."""
 
 
 def path(log: Log) -> Figure:
-    """Draw the path from above, coloured by time; beside it, draw x, y and yaw over time."""
+    """Draw two pictures side by side: the path from above, and x, y and yaw over time.
+
+    The colour of the path shows the time.
+    """
     figure = new_figure(5.2)
     left, right = np.ravel(np.asarray(figure.subfigures(1, 2, width_ratios=(1.2, 1.0))))
     above = left.subplots()
@@ -164,9 +167,10 @@ def spectra(log: Log) -> Figure:
 
 
 def timing(log: Log) -> Figure:
-    """Draw how evenly messages are timed: the steps between timestamps, and the delays of arrival.
+    """Draw how evenly messages are timed.
 
-    The median step is subtracted from the steps, and the smallest delay from the delays.
+    The first row shows the steps between successive timestamps, minus the median step. The second
+    row shows the delays with which messages arrived, minus the smallest delay.
     """
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
@@ -248,9 +252,10 @@ def timeline(log: Log) -> Figure:
 
 
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
-    """Yield a span of time and a colour for each message of a status.
+    """Yield a span of time and a colour for each message of a diagnostic status.
 
-    The span ends at the next message. If the next message is late or missing, the span lasts 1 s.
+    The span lasts until the next message. If the next message is late or missing, the span lasts 1
+    s.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0
@@ -267,7 +272,10 @@ def _name_states(axes: Axes, log: Log) -> None:
 
 
 def _stretches(series: Series) -> list[Span]:
-    """Return the spans of time in which commands arrived without a pause of more than 0.5 s."""
+    """Return the spans of time in which commands arrived.
+
+    A span ends if the next command comes more than 0.5 s later, or does not come.
+    """
     if not len(series):
         return []
     times_s = series.arrived_s
