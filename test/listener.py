@@ -83,9 +83,9 @@ def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[An
 
 
 def end_patiently(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lengthen the time limits for closing a link.
+    """Make the time limits for the closing of a link longer.
 
-    On a busy computer, the proof that the robot is at rest comes later.
+    On a busy computer, the proof that the robot is at rest needs more time than usual.
     """
     for limit in ("STANDS_WITHIN_S", "SILENCE_S", "BOTH_PROOFS_S", "JOIN_TIMEOUT_S"):
         monkeypatch.setattr(f"omnibot_driver.link.{limit}", PATIENCE_S)

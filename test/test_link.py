@@ -50,9 +50,9 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """The caller's thread may hang after a command. The pacer, another thread, repeats the command.
+    """The pacer, a thread of the link, repeats commands and applies the command timeout.
 
-    After the timeout, the pacer stops the robot.
+    So both work even if the caller's thread hangs after a command.
     """
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -71,10 +71,10 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard gets at most ten heartbeats per second, although the pacer thread runs more often.
+    """The guard process gets at most ten heartbeats a second, although the pacer runs more often.
 
-    The driver regards a guard with many unread heartbeats as hung. If heartbeats were sent at a
-    higher rate, the driver would replace a guard that is only slow.
+    The reason: if a guard does not read its heartbeats, the driver regards it as hung and replaces
+    it. With more heartbeats, the driver would also replace a guard that is only slow.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -93,7 +93,10 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
-    """The link counts its openings and bytes, and says why its port is closed."""
+    """The link counts how often its port was opened, and how many bytes were read and written.
+
+    While the port is closed, the link says why.
+    """
     listener, name = Listener(), tmp_path / "board"
     link = link_to(str(name), listener, session())
     link.start()
@@ -129,7 +132,7 @@ def test_closing_writes_stop_and_ends_the_threads(
 
 @dataclass
 class SlowShutdown:
-    """A shutdown in which each proof that the robot is at rest needs all the time that it gets."""
+    """A shutdown in which each proof of a standstill comes as late as the link allows."""
 
     proof_takes_s: float
     stands: bool = False
@@ -146,11 +149,11 @@ class SlowShutdown:
 def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proofs(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Displacements are rare, so a proof that the robot is at rest needs the longest possible wait.
+    """The driver's end has a time limit. It is longer than the longest possible shutdown of a link.
 
-    The link waits for two proofs. The first proof comes at the last moment, and the second one does
-    not come. The two waits and the time for the guard's last words are together shorter than the
-    time limit for the driver's end.
+    In this test, displacements are rare, so the link waits as long as possible for each of two
+    proofs of a standstill. The first proof comes at the last moment, and the second one does not
+    come. After the two waits, there is still time for the guard's last words.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S
@@ -175,9 +178,10 @@ def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proof
 def test_every_read_and_every_write_can_be_listened_to(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The functions ``on_read`` and ``on_write`` get all bytes that the link reads and writes.
+    """``on_read`` gets all bytes that the link reads, and ``on_write`` all bytes that it writes.
 
-    The written bytes include the final Stop. Bytes from before the link's start are discarded.
+    The written bytes include the final Stop. The link discards bytes that arrived before its start,
+    so ``on_read`` does not get them.
     """
     end_patiently(monkeypatch)
     read, written = [], []
@@ -236,9 +240,10 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """A guard process cannot share the port, here ``loop://``. The driver reports this once.
+    """A guard process cannot share a port of this kind (``loop://``). The driver reports this once.
 
-    Without a guard process, only the driver itself can stop the robot.
+    The user must know it, because without a guard process only the driver itself can stop the
+    robot.
     """
     listener = Listener()
     link = link_to("loop://", listener, session())

@@ -23,7 +23,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: PtyBoard) -> None:
-    """Events of callers, reader and pacer stay in order, even if the listener is sometimes slow."""
+    """The listener gets the events of all threads in order, even if it is sometimes slow.
+
+    The threads are a caller's thread, the reader and the pacer.
+    """
     happened: list[Event] = []
     ours, listener = session(), Listener()
     hear, take_events, deliver = ours.inbound.hear, ours.take_events, listener.deliver
@@ -67,10 +70,9 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """A listener hangs.
+    """A listener hangs. A caller's e-stop and repeated commands do not wait for it.
 
-    Neither a caller's e-stop nor the repetition of a command waits for the listener. The listener
-    gets its events later, in order.
+    When the listener runs again, it gets its events in order.
     """
     listener, ours = Listener(), session()
     deliver, hang, goes_on = listener.deliver, threading.Event(), threading.Event()
@@ -100,9 +102,10 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """An e-stop is latched, so a command is refused. The listener gets both events in this order.
+    """The e-stop is latched, a command is refused, and the e-stop is released.
 
-    The log therefore shows the reason first.
+    The listener gets these events in this order. So the log shows the reason of the refusal before
+    the refusal.
     """
     listener, ours = Listener(), session()
     link = link_to(

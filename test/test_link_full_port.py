@@ -81,9 +81,9 @@ def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
 ) -> None:
     """The board is silent, so the link closes without a proof of rest, and the guard repeats Stop.
 
-    If the port accepted the link's last packets, they may still be in the port's buffer. Then the
-    guard keeps the content of the buffer. If the port was full, the buffer contains old commands,
-    and the guard discards them.
+    There are two cases. If the port has accepted the link's last packets, they may still be in the
+    port's buffer, so the guard keeps the buffer. If the port is full, its buffer contains old
+    commands, so the guard discards them.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

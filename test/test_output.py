@@ -73,9 +73,9 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """The output is not read. At the program's end, Python prints a message, and does not block.
+    """Nothing reads the program's output. At its end, it prints a message and does not block.
 
-    There are two cases: the program has filled the pipe exactly (with 16 blocks of 4096 bytes), or
+    There are two cases. The program has filled the pipe exactly (16 blocks of 4096 bytes), or it
     has printed more than the pipe can hold (100 blocks).
     """
     program = f"""
@@ -112,9 +112,9 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """Standard streams are closed, so their descriptors are free. A port gets another descriptor.
+    """Standard streams are closed, so their descriptors are free. A port must not get one of them.
 
-    If it got one of the free descriptors, printed text would go to the board.
+    Otherwise text that the program prints would go to the board.
     """
     program = """
 import os, sys

@@ -56,7 +56,7 @@ def node() -> Iterator[Node]:
 
 
 def session_with(node: Node) -> tuple[Session, Publishing]:
-    """Return a session without a board, and the publishers of its events."""
+    """Return a session that has no open port, and the publishers of its events."""
     session = Session(
         omnibot.make(VALUES),
         parameters.session_settings(VALUES, omnibot.kinematics(VALUES)),
@@ -72,9 +72,9 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
-    """No publisher has event handlers.
+    """No publisher has event handlers, because they would make commands wait.
 
-    If there were handlers, the executor would spend time on each, and commands would have to wait.
+    The executor would spend time on each handler.
     """
     script = (
         "import rclpy\n"
@@ -123,7 +123,7 @@ def test_a_simulated_time_that_no_stamp_can_express_publishes_nothing(
 ) -> None:
     """A faulty ``/clock`` sends the largest seconds and nanoseconds that a message can contain.
 
-    The measurement is not published, and the driver continues.
+    No stamp can express this time. So the driver does not publish the measurement, and continues.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -142,7 +142,8 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 ) -> None:
     """Measurements are published only after the simulated clock has begun.
 
-    Stamps increase even between two steps of the clock. If the clock jumps back, stamps do, too.
+    While the simulated clock stands between two steps, the stamps still increase. If the clock
+    jumps back, the stamps jump back too.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
@@ -182,10 +183,10 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 
 
 def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
-    """The simulated clock has not begun. Results of requests are nevertheless passed on.
+    """The driver passes on the result of a request before the simulated clock has begun.
 
-    A result needs no stamp. A measurement of a type that only one board has needs a stamp, so it is
-    not published.
+    A result needs no stamp. The other readings of types that only one board has need a stamp, so
+    the driver does not publish them.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -251,10 +252,10 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One read contains a report of a pause, and then data.
+    """One read contains a report of a pause, and then data. So the pause is over after the read.
 
-    In the middle of this read, another thread publishes the state "paused". So after the read, the
-    driver publishes "nominal". If it did not, later subscribers would get "paused".
+    In the middle of the read, another thread publishes the state "paused". Therefore the driver
+    publishes "nominal" after the read. Otherwise, later subscribers would get "paused".
     """
     session, publishing = session_with(node)
     published: list[str] = []
@@ -286,7 +287,7 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
 
 @dataclass(frozen=True, slots=True)
 class Charge:
-    """A value that only one board has."""
+    """A reading of a type that only one board has."""
 
     volts: float
 

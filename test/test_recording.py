@@ -72,9 +72,10 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """A bag has two robots with two lines each. The topic of one line selects the robot.
+    """A bag has two robots, and each robot has two lines. The user gives the topic of one line.
 
-    The bytes of each line reach the channel of this line.
+    This topic selects the robot. Both lines of this robot are replayed, and the bytes of each line
+    reach the channel of this line.
     """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
@@ -114,7 +115,10 @@ def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why:
 
 
 def test_a_bag_without_the_wire_says_how_to_record_it(tmp_path: Path) -> None:
-    """A bag without raw bytes is refused. It was probably recorded without ``publish_raw``."""
+    """A bag without raw bytes is refused. The message says how to record them.
+
+    The driver records raw bytes only with ``publish_raw``.
+    """
     path = bag(tmp_path / "bag", "/odom", kind="std_msgs/msg/String")
     with pytest.raises(ParameterError, match="record with `publish_raw: true`"):
         open_recording(f"replay://{path}")

@@ -63,10 +63,10 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion monitor has stopped the robot. Then only invalid or late commands are sent.
+    """The motion monitor has stopped the robot. Then only invalid or late commands come.
 
-    The robot may move again only after its sender was silent for a time. A sender of invalid or
-    late commands is not silent. So the driver also refuses the next valid command.
+    The robot may move again only after its sender was silent for a time. This sender was not
+    silent, although its commands were refused. So the driver refuses its next valid command, too.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -80,9 +80,10 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot. Then commands are refused because of a stall.
+    """The motion monitor has stopped the robot. Later commands are refused because of a stall.
 
-    These commands show that their sender is not silent, so its next command is refused, too.
+    Such commands show that their sender is not silent. So the driver also refuses the next command
+    that comes after the stall.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -100,10 +101,11 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a stop by the motion monitor, the sender pauses for ``cmd_vel_timeout``.
+    """A refused command does not start a refusal again that has already ended.
 
-    Motion is then allowed again. A late command does not change this: it is refused, but the next
-    command is obeyed.
+    The motion monitor has stopped the robot, and the sender has paused for ``cmd_vel_timeout``. So
+    motion is allowed again. Then a late command comes, and is refused because it is late. The
+    driver obeys the next command.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -34,7 +34,10 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
 
 
 def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
-    """A simulated robot ends with the driver, so the driver does not warn that it has no guard."""
+    """A simulated board ends with the driver's process, so it needs no guard process.
+
+    Therefore the driver does not warn that there is none.
+    """
     listener, ours = Listener(), session()
     link = link_to("sim://?running", listener, ours)
     link.start()
@@ -53,9 +56,9 @@ def test_options_come_after_a_question_mark() -> None:
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The simulated board's thread fails.
+    """The thread of the simulated board fails.
 
-    The driver reports a defect and its cause, not a lost cable.
+    The driver reports this as a defect, with its cause. It does not report a lost cable.
     """
 
     def explode(_board: SimulatedBoard) -> bytes:

@@ -2,9 +2,11 @@
 
 """Command several MART robots with the same speed, which changes every 1 to 3 s and may be zero.
 
-Arguments: the duration in s, and the namespaces. Output: a JSON list with an array for each
-namespace. The array has a pair for each speed: the steady clock's time in s at which the speed was
-first published, and the speed in m/s.
+Arguments: the duration in s, and the namespaces of the robots.
+
+Output: a JSON list. It has an array for each namespace, and the array has a pair for each speed. A
+pair is the time at which the speed was first published, in s of the steady clock, and the speed in
+m/s.
 """
 
 import json
@@ -15,14 +17,18 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Commanded speeds in m/s, again and again. During the two zeros at the end, the robot comes to
-rest, so that it can be started again."""
+"""Speeds in m/s that are commanded in this order. After the last one, the list begins again.
+During the two zeros at its end, the robot comes to rest. So each repetition starts a robot at
+rest."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Publish each speed to all robots; record when it was first published to each of them."""
+    """Publish each speed to all robots.
+
+    For each robot, record when each speed was first published.
+    """
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

@@ -41,10 +41,11 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios, for each adapter: value of the driver divided by value of the floor.
+"""Largest allowed ratios for each adapter. A ratio is the driver's value divided by the floor's
+value.
 
-The four ratios are: median latency, 99th percentile of the latency, processor time, and latency of
-cmd_vel. None means that a ratio has no limit.
+The four ratios are, in this order: median latency, 99th percentile of the latency, processor
+time, and latency of cmd_vel. None means that a ratio has no limit.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -261,9 +262,9 @@ def split(seconds: float) -> list[str]:
 def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return for each message the time of its frame's delivery, in s, and its latency, in µs.
+    """Return, for each message, when its frame was delivered, in s, and its latency, in µs.
 
-    ``unit``: value in the message that corresponds to 1 in the frame.
+    ``unit``: a message contains a number from its frame, multiplied by this factor.
     """
     found = []
     for at, value in heard:
@@ -279,7 +280,7 @@ def latencies(
 def command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return, for each command, the time in µs until the board reads the frame of this command."""
+    """Return, for each command, the time in µs from its sending until the board reads its frame."""
     found = []
     frames = [
         (at, struct.unpack_from(">h", data, begin + 3)[0])

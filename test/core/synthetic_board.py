@@ -2,7 +2,8 @@
 
 """A synthetic board for odometry tests. It moves with given body twists and returns readings.
 
-The board uses rotation matrices and shares no code with the code under test.
+It computes with rotation matrices. It shares no code with the driver, so that it can show errors in
+the driver's code.
 """
 
 import math
@@ -27,7 +28,11 @@ def close(values: Triple, tolerance: float = 1e-9) -> object:
 
 
 def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
-    """Return the displacement under a constant twist, by the integral of the rotation matrix."""
+    """Return the displacement in x and y during a motion with a constant twist.
+
+    It is the integral of the rotation matrix. ``vx``, ``vy`` and ``turn`` are velocity times
+    duration.
+    """
     if abs(turn) < 1e-6:
         return vx - vy * turn / 2, vy + vx * turn / 2
     a, b = math.sin(turn) / turn, (1 - math.cos(turn)) / turn
@@ -35,9 +40,10 @@ def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
 
 
 class Trip:
-    """A drive of a robot: its true pose, and what its board reports.
+    """A drive of a robot: the true pose of the robot, and the readings of its board.
 
-    The board has a given initial heading, and its axes may be reversed.
+    ``heading``: the board's initial heading in rad. ``signs``: -1 for each axis that the board
+    reverses.
     """
 
     def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
@@ -46,9 +52,9 @@ class Trip:
         self._signs = signs
 
     def move(self, dx: float, dy: float, turn: float, frame: str = "earth") -> DisplacementReading:
-        """Move with a constant twist for one period, and return the board's reading.
+        """Move with a constant twist for one period ``PERIOD_S``, and return the board's reading.
 
-        The arguments are displacements along the true body axes.
+        ``dx``, ``dy``, ``turn``: twist times duration, in the robot's true body axes.
         """
         self.truth = self._moved(self.truth, dx, dy, turn)
         x, y, yaw = self._signs
@@ -86,7 +92,10 @@ def heading(yaw: float) -> PoseReading:
 
 
 def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
-    """Deliver the board's pose twice, so that the odometry accepts it, and return the estimates."""
+    """Deliver a pose of the board twice; return the odometry estimates of the second delivery.
+
+    The odometry accepts the pose only when it comes for the second time.
+    """
     assert odometry.settle(pose) == []
     return odometry.settle(pose)
 

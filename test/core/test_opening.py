@@ -35,9 +35,10 @@ def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
 
 
 def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
-    """The port is opened, the board reports a pause and is then started, and the port is closed.
+    """The state follows what the driver does and what it receives from the board.
 
-    The states are disconnected, connecting, paused, nominal and disconnected again.
+    It is disconnected at first. It is connecting when the port is open, paused when the board
+    reports a pause, nominal when the board was started, and disconnected when the port is closed.
     """
     bench = Bench(run=False)
     assert bench.session.state == "disconnected"
@@ -105,8 +106,8 @@ def test_a_silent_board_is_told_once() -> None:
 def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: bytes) -> None:
     """Three IMU frames arrive, which do not show the mode. Then the board is silent for 8 s.
 
-    During the silence, a part of a frame may arrive. When the board sends again, all stamps are
-    recent.
+    In one case, a part of a frame arrives during the silence. When the board sends again, the
+    stamps are from this time. None is from before the silence.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()
@@ -128,10 +129,10 @@ def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: b
 
 @pytest.mark.parametrize("waits", [ImuFrame((0, 0, -16384), (0, 0, -1)), DeltaFrame(7, 0, 0, 255)])
 def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: Frame) -> None:
-    """The last byte of a frame may begin another frame, so the decoder holds the frame.
+    """A frame is held when the board falls silent, and is never published.
 
-    Then the board falls silent before its mode is known. When new data come, the driver publishes
-    these data, but not the held frame.
+    The last byte of this frame may begin another frame, so the decoder holds the frame. The mode of
+    the board is not known yet. When new data comes, the driver publishes only the new data.
     """
     bench, rest = Bench(), encode(REST)
     bench.open()
@@ -169,9 +170,9 @@ def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -
 
 
 def test_a_paused_robot_is_still_paused_after_a_reconnect(bench: Bench) -> None:
-    """The user pauses the board. Then the port is closed and opened again.
+    """The user pauses the board. Then the driver's port is closed and opened again.
 
-    The board is still paused.
+    Opening the port does not start the board: it is still paused.
     """
     bench.ask(Request.PAUSE, 5.0)
     bench.close()

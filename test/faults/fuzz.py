@@ -21,10 +21,9 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""Least share of the board's IMU frames that must be published.
+"""Least share of the board's IMU frames that the driver must publish.
 
-It is the share of the frames that the board sends from the beginning of the random input until 2 s
-after its end.
+The share is computed for the time from the beginning of the random input until 2 s after its end.
 """
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 

@@ -18,11 +18,13 @@ LOST: Final = "lost .*retrying"
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
     """Let the adapter hold back the driver's data, and then deliver all of it at once.
 
-    The robot must be at rest after the delivery.
+    After this delivery, the robot must be at rest.
 
-    ``seconds``: time for which commands continue. The adapter holds the data for 1 s longer.
+    ``seconds``: the time for which the driver gets commands. The adapter holds the data for 1 s
+    longer than that.
 
-    ``mute``: whether the driver receives no data from the board during this time.
+    ``mute``: whether the driver gets no data from the board while the adapter holds the driver's
+    data.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -36,7 +38,9 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
 
 def full(rig: Rig, *, mute: bool = False) -> None:
-    """Fill the port with old commands. When the port accepts data again, the robot must stop.
+    """Fill the port with old commands.
+
+    When the port accepts data again, the robot must come to rest.
 
     ``mute``: whether the driver receives no data from the board while the port is full.
     """
@@ -53,11 +57,10 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full while the driver opens it repeatedly.
+    """Keep the port full for so long that the driver closes it and opens it again, more than once.
 
-    The driver must report only once that the port accepts no data.
-
-    When the port accepts data again, the robot must stop.
+    The driver must report only once that the port accepts no data. When the port accepts data
+    again, the robot must come to rest.
     """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
@@ -122,9 +125,9 @@ def server_holds(rig: NetworkRig, *, mute: bool) -> None:
 
 
 def server_closes_one_direction(rig: NetworkRig) -> None:
-    """Close the direction of the connection from the board to the driver.
+    """The server closes one direction of the connection: from the board to the driver.
 
-    The driver must notice this and send Stop in the other direction.
+    The driver must notice this, and send Stop in the other direction, which is still open.
     """
     rig.drive()
     since, mark = rig.line.tick, len(rig.driver.lines)

@@ -2,9 +2,9 @@
 
 """Faults in random order, several of them at the same time, while random commands move the robot.
 
-Every few steps, the commands and the faults end. Only damage to the bytes on the way to the board
-continues. The robot must come to rest. Then the damage ends too, and the robot must obey a fresh
-command.
+Every few steps there is a break, in which the robot must come to rest. In the break, the commands
+and most faults end. Only the damage to bytes on the way to the board continues at first. Then this
+damage ends too, and the robot must obey a new command.
 """
 
 from collections.abc import Callable
@@ -21,8 +21,8 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-It is longer than the command timeout. A driver that was without data does not know whether the
-robot moves: it must first receive measurements.
+This time is longer than the command timeout. The reason: if the driver had no data, it does not
+know whether the robot moves, and must receive measurements before it can act.
 """
 
 

@@ -17,7 +17,7 @@ Fault = Callable[[int, Random], Origins]
 
 
 def none(length: int, random: Random) -> Origins:
-    """Damage nothing. The stream starts at a random byte of its first second."""
+    """Damage no byte. The host begins to read at a random byte of the first second."""
     return list(range(random.randrange(1700), length))
 
 
@@ -47,7 +47,7 @@ def added(rate: float) -> Fault:
 def bursts(rate: float) -> Fault:
     """Return a fault that loses 1 to 200 bytes in a row.
 
-    ``rate``: the probability that such a loss begins at a byte.
+    ``rate``: for each byte, the probability that such a loss begins with it.
     """
 
     def fault(length: int, random: Random) -> Origins:
@@ -75,16 +75,18 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(slots=True)
 class Received:
-    """The bytes that have arrived, their times of arrival in s, and the true stream.
+    """The bytes that have arrived, and the stream that was sent.
 
-    ``truth``: the true stream, which was sent.
+    ``times_s``: for each byte, the time in s at which it arrived. ``truth``: the stream as it was
+    sent, without damage.
     """
 
     data: bytes
     times_s: list[float]
     origins: Origins
     intact: list[bool]
-    """For each true frame, whether all its bytes arrived without other bytes between them."""
+    """One value for each sent frame: whether all its bytes have arrived, without added bytes
+    between them."""
     truth: Truth
 
 
@@ -120,9 +122,10 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes. The line may be idle between two bytes of a piece.
+    """Deliver pieces of 1 to 8 bytes. A piece may contain a time in which the line is idle.
 
-    But all bytes of a piece come within 16 ms, because adapters keep no byte for longer.
+    But the first and the last byte of a piece are at most 16 ms apart, because an adapter holds no
+    byte for longer.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):
@@ -134,7 +137,10 @@ def few_bytes(received: Received, random: Random) -> Chunks:
 
 
 def whole_bursts(received: Received, random: Random) -> Chunks:
-    """Deliver all waiting bytes when the line becomes idle, as some adapters do."""
+    """Hold all bytes until the line is idle for 3 ms, and then deliver them at once.
+
+    Some adapters do this.
+    """
     times = received.times_s
     ends = [n for n in range(1, len(times)) if times[n] - times[n - 1] > 3e-3] + [len(times)]
     return [(end, times[end - 1]) for end in ends]

@@ -12,7 +12,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 
 def key_of(frame: Frame) -> Key:
-    """Return the kind and the content of a decoded frame, in the form of the true frames."""
+    """Return the kind and the content of a frame, for a comparison with the sent frames."""
     match frame:
         case ImuFrame(accel, gyro):
             return ("imu", accel, gyro)
@@ -34,9 +34,9 @@ def driver() -> tuple[Feed, Feed]:
 
 
 def plain() -> tuple[Feed, Feed]:
-    """Make a parser that checks nothing. Return the functions that feed and flush it.
+    """Make a parser that has no checks. Return the functions that feed and flush it.
 
-    A header alone determines the kind and the length of a frame.
+    The parser knows the kind and the length of a frame only from the two bytes of its header.
     """
     held = bytearray()
 

@@ -44,7 +44,7 @@ PATTERNS = {
     "lattice": r"lattices?",
     "farewell": r"farewells?",
 }
-"""The phrases that must not be used. The values are patterns, which match only full words."""
+"""The phrases that must not be used, each with a pattern. A pattern matches only whole words."""
 
 ALLOWED = {
     "test/package/test_plain_english.py": "names the phrases",
@@ -78,7 +78,7 @@ def texts() -> dict[str, str]:
 
 @cache
 def found() -> dict[str, list[str]]:
-    """Return all places of each phrase that is used: the file, the line and the words."""
+    """Return, for each phrase that is used, its places: file, line and the words there."""
     places: dict[str, list[str]] = {}
     lowered = {name: text.lower() for name, text in texts().items() if name not in ALLOWED}
     for phrase, one in PATTERNS.items():
@@ -107,7 +107,7 @@ def test_the_phrase_is_not_used(phrase: str) -> None:
 
 
 def test_no_docstring_begins_with_a_conjunction() -> None:
-    """No docstring begins with a conjunction, so that each can be understood by itself."""
+    """No docstring begins with a conjunction, because such a docstring needs its context."""
     possible = re.compile(rf"""["'\\]\s*(?:{"|".join(CONJUNCTIONS)})\b""")
     fragments = [
         f"{name}: {doc.splitlines()[0]}"

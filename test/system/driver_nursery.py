@@ -25,7 +25,8 @@ from typing import NoReturn
 LARGEST_REQUEST = 1 << 17
 """Largest size of a request, in bytes.
 
-A request has the arguments and the environment of a driver, and code that runs before it.
+A request contains the arguments and the environment of a driver, and Python code. The forked
+process runs this code before the driver.
 """
 
 

@@ -60,9 +60,9 @@ def free_udp_port() -> int:
 
 
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
-    """16 drivers and an observer are clients of a discovery server. The observer finds all drivers.
+    """16 drivers are clients of a discovery server. An observer, a super client, finds all of them.
 
-    Clients do not use multicast.
+    It does so without multicast, which such clients do not use.
     """
     port = str(free_udp_port())
     environment = {

@@ -52,7 +52,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def hang(driver: Driver, board: PtyBoard) -> int:
-    """Suspend the driver. Return how many bytes the board has received before the suspension."""
+    """Suspend the driver. Return how many bytes the board has received from it until then."""
     driver.process.send_signal(signal.SIGSTOP)
     stat = Path(f"/proc/{driver.process.pid}/stat")
     wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T")
@@ -108,9 +108,10 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
     board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
 ) -> None:
-    """A driver is killed, and its guard process still uses the port.
+    """A driver is killed. For a short time, its guard process still uses the port.
 
-    A new driver tries again until the guard process has released the port.
+    A new driver tries again and again to open the port. It succeeds when the guard process has
+    released the port.
     """
     driving(probe, board)
     driver.end(signal.SIGKILL)
@@ -159,7 +160,7 @@ time.clock_gettime_ns = lambda clock: real(clock) + (
     60_000_000_000 if clock == time.CLOCK_BOOTTIME and os.path.exists({path!r}) else 0
 )
 """
-"""Code that advances CLOCK_BOOTTIME by 60 s once the file ``path`` exists.
+"""Code for the driver's process. When the file ``path`` exists, CLOCK_BOOTTIME is 60 s ahead.
 
 CLOCK_BOOTTIME also counts the time for which a host is suspended.
 """
@@ -168,9 +169,9 @@ CLOCK_BOOTTIME also counts the time for which a host is suspended.
 def test_a_robot_is_stopped_when_its_host_was_suspended(
     board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The computer is suspended while the robot drives. Afterwards the driver stops the robot.
+    """The computer is suspended while the robot drives. Afterwards, the driver stops the robot.
 
-    The command timeout does not cause this, because its clock does not count the suspension.
+    The command timeout is not the cause, because its clock does not count the suspension.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
@@ -189,9 +190,9 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """A stamped command is sent while the driver hangs.
+    """A command with a stamp is sent while the driver hangs. The stamp is recent.
 
-    The driver refuses it despite its recent stamp.
+    Nevertheless, the driver refuses the command after the hang.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
@@ -217,7 +218,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_again(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """A command is sent while the driver hangs, and is refused. The driver obeys its repetition."""
+    """A command that came during a hang is refused. The driver obeys it when it is sent again."""
     commands = probe.publisher(Twist, "cmd_vel")
     mark = hang(driver, board)
     commands.publish(twist(0.2))
@@ -271,9 +272,9 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
 
 
 def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
-    """The user presses ctrl-C while the robot drives.
+    """The user presses ctrl-C while the robot drives. The driver itself stops the robot.
 
-    The driver itself stops the robot. It sends no emergency stop.
+    So the guard process has nothing to do, and no emergency stop is sent.
     """
     driving(probe, board)
     assert driver.end(signal.SIGINT) == 0

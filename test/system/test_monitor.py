@@ -54,7 +54,8 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received a motion command.
 
-    One press may have no effect: a program may stall, or a subscription may not be discovered yet.
+    It may be necessary to press several times: a program may stall, or a subscription may not be
+    discovered yet.
     """
     for _ in range(20):
         said.clear()
@@ -140,9 +141,10 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The user presses a key once. The monitor sends motion commands, then some zero commands.
+    """The user presses a key once, and releases it. The robot stops.
 
-    So the robot stops. When the user ends the monitor, it sends one more zero command.
+    To stop it, the monitor sends some zero commands after the motion commands. When the user ends
+    the monitor, it sends one more zero command.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -167,9 +169,9 @@ def test_the_speeds_of_the_keys_are_tenths_of_the_drivers_limit(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """The driver has a lower speed limit than the default.
+    """The speed of the keys depends on the driver's speed limit. It begins at 30 % of this limit.
 
-    The monitor begins at 30 % of the driver's limit.
+    In this test, the driver has a lower limit than the default.
     """
     driver = start_driver("sim://", max_linear_speed=0.4)
     probe_of(driver).wait_for_state("nominal")
@@ -185,9 +187,10 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """A held key moves the robot. The monitor ends by SIGTERM, or its window is closed.
+    """The user holds a key, so the robot moves. Then the monitor is ended, and it stops the robot.
 
-    The monitor stops the robot. In this test, the monitor sends stamped commands.
+    There are two cases: the monitor gets SIGTERM, or its window is closed. In this test, the
+    monitor sends stamped commands.
     """
     board = start_board()
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
@@ -209,9 +212,10 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 def test_keys_pressed_while_it_was_suspended_move_nothing(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The monitor is suspended while it steers, so the driver stops the robot.
+    """The monitor is suspended after it has moved the robot. Meanwhile, the user presses keys.
 
-    Keys that were pressed during the suspension do not move the robot.
+    When the monitor runs again, it does not send commands for these keys. So the robot does not
+    move.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -234,9 +238,10 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """SIGSTOP suspends the monitor before it can restore the terminal. Then the monitor resumes.
+    """A monitor that SIGSTOP has suspended still restores the terminal at its end.
 
-    The user presses q. The monitor ends and restores the terminal.
+    SIGSTOP leaves the monitor no time to restore the terminal before the suspension. After the
+    suspension, the monitor draws its screen again. Then the user presses q, and the monitor ends.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

@@ -30,9 +30,9 @@ commands = st.tuples(speeds, speeds, speeds)
 
 
 def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
-    """Check for two simulated seconds that a robot obeys ``command``.
+    """Check for two simulated seconds whether a robot obeys ``command``.
 
-    ``measured``: the robot's velocity, which is constant.
+    ``measured``: the velocity of the robot during this time. It is constant.
     """
     obedience = Obedience(topic, PARAMETERS.by_name)
     for tick in range(200):
@@ -40,9 +40,9 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """The robot has slow odometry and does not move. The tool reports this only after 3 s.
+    """If the odometry is slow, the tool waits 3 s before it reports that the robot does not move.
 
-    The driver has no scale parameters, so the error does not mention scales.
+    The driver in this test has no scale parameters, so the error does not mention scales.
     """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
@@ -110,9 +110,10 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """A robot obeys if it reaches a fifth of the command. Otherwise the tool reports an error.
+    """A robot obeys if it moves with at least a fifth of the commanded velocity.
 
-    A very slow command is not judged. A robot whose measured velocity contains NaN does not obey.
+    Otherwise the tool reports an error. If a measured velocity contains NaN, the robot does not
+    obey. The tool does not check very slow commands.
     """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
@@ -124,7 +125,7 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """``stairs`` returns each command until the time of the command is over.
+    """``stairs`` returns one command after the other, each for the duration of this command.
 
     After the last command, it returns None, which ends the motion.
     """
@@ -228,9 +229,10 @@ def test_axis_signs_gyro_bias_and_linear_scale_may_be_written() -> None:
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
-    """The user names an unsuitable file for the calibration or the picture. The tool rejects it.
+    """The user names a file that the tool cannot use for the calibration or for the picture.
 
-    Examples: ROS parameters, an invalid value, an unknown type of picture.
+    The tool rejects the file. Examples: a file of ROS parameters, a file with an invalid value, a
+    picture of an unknown type.
     """
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
@@ -258,9 +260,9 @@ def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixt
 
 @pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a wheel controller")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
-    """The board lacks what a calibration needs. The calibration is refused in one sentence.
+    """A board lacks something, so the tool refuses a calibration that needs it, in one sentence.
 
-    The OmniBot has everything that the calibrations need, so none is refused.
+    The OmniBot lacks nothing, so the tool refuses none of the calibrations.
     """
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)

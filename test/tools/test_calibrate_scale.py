@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``calibrate scale``, which finds the board's units: counts per m/s and per rad/s."""
+"""Tests of ``calibrate scale``, which finds the scales of the board.
+
+A scale is the number of the board's counts for 1 m/s or for 1 rad/s.
+"""
 
 import math
 from pathlib import Path
@@ -24,10 +27,11 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """Return the log of a drive, with commands that are planned for the scales ``ASSUMED``.
+    """Return the log of a drive. Its commands are planned for a board with the scales ``ASSUMED``.
 
-    ``true``: the scales that the board really has. ``gyro``: factor on the yaw rate that the gyro
-    measures.
+    ``true``: the scales that the board really has.
+
+    ``gyro``: the rate that the gyro measures, divided by the true yaw rate.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -58,10 +62,9 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """Whatever the scales of the board, the tool finds them.
+    """The tool finds the scales of any board, by the odometry and, for turns, also by the gyro.
 
-    The error is at most five times the standard deviation that the tool claims. The tool finds the
-    scale of turns by the odometry and also by the gyro.
+    The error is at most five times the standard deviation that the tool states.
     """
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
@@ -78,7 +81,7 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """Each planned command is a whole number of the board's counts, and at most the speed ``top``.
+    """Each planned command is a whole number of the board's counts, and not faster than ``top``.
 
     There is one exception: if one count is already faster than ``top``, the command is one count.
     """
@@ -89,10 +92,10 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """While the tool measures a speed, commands are missing from the log for a time.
+    """While the tool measures a speed, no commands are logged for a time.
 
-    The driver's command timeout may have stopped the robot. So the tool does not use its
-    measurement of this speed.
+    In this time, the driver's command timeout may have stopped the robot. So the tool does not use
+    the measurement of this speed.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
@@ -102,9 +105,9 @@ def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
 
 
 def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
-    """Gyro and odometry differ by 5 %. A note recommends ``calibrate geometry``.
+    """If the gyro and the odometry differ by 5 %, a note recommends ``calibrate geometry``.
 
-    A difference of 2 % is within the gyro's tolerance.
+    If they differ by only 2 %, this is within the gyro's tolerance, and there is no such note.
     """
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.05), ASSUMED, UP, NO_BIAS)
     assert any("calibrate geometry`, load" in note for note in result(found, NOW).notes)
@@ -122,9 +125,10 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """A log has no steady speed. In another log, the robot drives against its commands.
+    """The tool reports an error if it cannot find a scale. There are two cases.
 
-    The tool reports an error for each of these logs.
+    In the first log, no speed is steady. In the second log, the robot moves in the opposite
+    direction of its commands.
     """
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
@@ -135,9 +139,9 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``calibrate scale`` finds the board's unusual scales, and ``--apply`` sets them.
+    """The board has other scales than usual. ``calibrate scale`` finds and ``--apply`` sets them.
 
-    The driver of this test accepts only TwistStamped as velocity commands.
+    In this test, the driver accepts velocity commands only as TwistStamped.
     """
     monkeypatch.setattr(scale_module, "ACCELERATION", 2.0)
     monkeypatch.setattr(scale_module, "REST_S", 1.3)

@@ -146,7 +146,7 @@ def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_a_bag_of_something_else_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A bag has no topics of a driver, except /odom with a wrong type.
+    """A bag has no topic of a driver. Its topic /odom has another type than a driver's /odom.
 
     The report rejects the bag.
     """

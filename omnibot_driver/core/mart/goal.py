@@ -41,11 +41,10 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""Factor for the increase of the allowed heading error. The error increases with each turn since
-the last straight move.
+"""Factor by which the allowed heading error increases with each turn since the last straight move.
 
-After ``turns`` turns, it is ``NEAR_RAD * (1 + WIDER * turns)``. Turns go too far, so without
-this increase the robot could turn back and forth.
+After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. Turns go too far, so
+without this increase the robot could turn back and forth.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
@@ -150,8 +149,8 @@ class Move:
         """Return the ``Move`` to continue with when the goal ``place`` is commanded again.
 
         If the goal is in progress, it continues. If the goal has failed, it begins anew. If the
-        robot has reached the goal, the robot may have been moved away since then. It makes another
-        straight move only if it is now more than ENOUGH_M (m) away from the goal.
+        robot has reached the goal, it makes another straight move only if it is now more than
+        ENOUGH_M (m) away, for example because somebody has pushed it.
         """
         if not self.given_up:
             return self

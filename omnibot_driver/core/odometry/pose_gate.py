@@ -32,7 +32,7 @@ beyond 100 km or 16,000 turns, its bytes were misread."""
 class PoseGate:
     """Decides which poses of the board are accepted.
 
-    * ``proved``: the last accepted pose; None if there is none.
+    * ``proved``: the last accepted pose; None if there is none that is still valid.
     * ``doubted``: the last unexpected pose, which the next pose must confirm. Each later motion of
       the robot is added to it. None if there is no such pose.
     """

@@ -11,7 +11,7 @@ TIMEOUT_S = 0.5
 
 
 def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
-    """Return whether a command at ``now`` is accepted.
+    """Return whether a command that arrives at the time ``now`` is accepted.
 
     ``stands``: whether it is a zero command.
     """
@@ -38,9 +38,10 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """The motion monitor stops the robot, and no command arrives for the command timeout.
+    """A silence of the length of the command timeout ends the refusal of motion.
 
-    Motion is allowed again. The timeout begins with the last command, not with the stop.
+    The motion monitor has stopped the robot. The timeout is counted from the last command, not from
+    the stop.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -49,9 +50,10 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The motion monitor has stopped the robot, so motion is refused. A zero command arrives.
+    """The motion monitor has stopped the robot, so motion commands are refused.
 
-    The zero command is accepted, and after it motion commands are accepted again.
+    A zero command ends this refusal. The zero command itself is accepted, and so are the motion
+    commands that come later.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -78,9 +80,10 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The motion monitor stops the robot over a minute after its previous stop, or after ~/start.
+    """The motion monitor stops the robot for the second time, but this stop counts as a first stop.
 
-    The interlock treats this stop like the first one: motion is allowed again without ~/start.
+    There are two reasons for this: more than a minute has passed since the previous stop, or
+    ~/start was called since then. After a first stop, motion is allowed again without ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
@@ -93,10 +96,10 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """The board has no ~/start. The motion monitor stops the robot a second time within a minute.
+    """The board has no ~/start. The motion monitor has stopped the robot twice within a minute.
 
-    Then the release of the e-stop ends the refusal of motion. An earlier release, between the two
-    stops, does not end the refusal.
+    Motion is refused until the user releases the e-stop after the second stop. A release between
+    the two stops does not help.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

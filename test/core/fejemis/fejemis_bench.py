@@ -32,11 +32,11 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 class Bench:
     """A session with both simulated boards.
 
-    ``hears``: channels on which the robot receives bytes from the driver.
+    ``hears``: channels on which bytes from the driver reach the robot.
 
-    ``speaks``: channels on which the driver receives bytes from the robot.
+    ``speaks``: channels on which bytes from the robot reach the driver.
 
-    ``read_s``: time between two reads of the driver, in s.
+    ``read_s``: time in s between two reads of the driver.
     """
 
     def __init__(

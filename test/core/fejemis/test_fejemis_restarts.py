@@ -61,9 +61,10 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 @pytest.mark.slow
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """The drive board restarts at different times between two reads, which are 20 ms apart.
+    """The driver reads every 20 ms. The drive board restarts at different times between two reads.
 
-    A read may contain poses from before and after the restart. The odometry has no jump.
+    So a read may contain poses from before and from after the restart. Nevertheless, the odometry
+    does not jump.
     """
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
@@ -87,10 +88,11 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A board restarts during a slow drive. The driver reports it, and the robot stops.
+    """A board restarts during a slow drive. The driver reports the restart and stops the robot.
 
-    The robot stops although the last command is still valid. Some boards send a line that reports
-    the restart. If a board sends no such line, the times in its other lines show the restart.
+    The driver stops the robot although the last command is still valid. Some boards send a line
+    that reports the restart. If a board sends no such line, the driver detects the restart from the
+    times in the board's other lines.
     """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
@@ -116,10 +118,11 @@ def test_every_restart_stops_the_robot_and_is_reported(
 def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grown(
     away_s: float,
 ) -> None:
-    """The drive board restarts while its port is away, and its pose begins at zero again.
+    """The drive board restarts while its port is away. Its pose begins at zero again.
 
-    The port comes back ``away_s`` seconds after the restart. At that moment, the board's uptime is
-    shorter or longer than it was before the restart. The odometry does not jump in either case.
+    The port comes back ``away_s`` seconds after the restart. The board's uptime may then be shorter
+    or longer than before the restart. In both cases, the driver detects the restart, so the
+    odometry does not jump.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -140,11 +143,11 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 
 @pytest.mark.slow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
-    """The drive board restarts while its port is away. Meanwhile, the computer stalls.
+    """The drive board's port is away. During this time, the board restarts and the computer stalls.
 
-    Only this port is away. The driver notices the restart, so the odometry does not jump. After a
-    restart, the board's lines seem to be late. A stall can also make lines late. But this stall
-    ends before the port is back, so it cannot delay a line of the new connection.
+    The driver detects the restart, so the odometry does not jump. Late lines of a board can show a
+    restart, but a stall of the computer also makes lines late. This stall ends before the port is
+    back. So it cannot be the reason why lines of the new connection are late.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)
@@ -168,9 +171,9 @@ def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_a
 
 @pytest.mark.slow
 def test_a_port_that_was_away_for_long_is_no_restart() -> None:
-    """The ports are away for longer than the boards had run before. But no board restarts.
+    """The ports are away for longer than the boards had run before. No board restarts.
 
-    The driver reports no restart.
+    So the driver does not report a restart.
     """
     bench = nominal()
     bench.close()
@@ -187,9 +190,9 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 
 
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
-    """Restart a board while motion is commanded, and return why commands were refused.
+    """Restart a board while motion is commanded; return the reasons why commands were refused.
 
-    Also check that the robot drives again only after the front board has its configuration.
+    Also check that the robot drives again only after the driver has configured the front board.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)
@@ -230,9 +233,10 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """A board was silent. A heartbeat that it sent before the silence arrives late.
+    """A board was silent. Then a heartbeat arrives that the board sent before the silence.
 
-    Only a heartbeat from after the silence proves that the board has not restarted.
+    This heartbeat does not prove that the board has not restarted. Only a heartbeat that was sent
+    after the silence proves this.
     """
     bench = nominal()
     bench.run(2.0)
@@ -253,9 +257,10 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """A board was silent, so it may have restarted.
+    """A board was silent, so the driver does not know whether it has restarted.
 
-    The state becomes ``nominal`` only after a heartbeat has shown whether the board has restarted.
+    The state does not become ``nominal`` before a heartbeat of the board has answered this
+    question.
     """
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
@@ -270,9 +275,10 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """A board was silent, so the driver requests its heartbeat ten times a second.
+    """After a board was silent, the driver requests its heartbeat ten times a second.
 
-    The periodic heartbeats come only every 0.4 s. A requested heartbeat shows a restart earlier.
+    Without a request, heartbeats come only every 0.4 s. With the requests, the driver learns
+    earlier whether the board has restarted.
     """
     bench = nominal()
     bench.speaks = {DRIVE}
@@ -309,9 +315,10 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
-    """The computer stalls, so the boards may have restarted unnoticed.
+    """The computer stalls, so the driver does not know whether the boards have restarted.
 
-    Within 0.25 s, a heartbeat shows that they have not, and the robot is driven again.
+    Within 0.25 s after the stall, heartbeats show that no board has restarted. So the driver
+    accepts commands again.
     """
     bench = nominal()
     bench.run(2.0)

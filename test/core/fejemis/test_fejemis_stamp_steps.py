@@ -17,9 +17,9 @@ from omnibot_driver.core.readings import ImuReading
 
 
 def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
-    """The times of two readings differ by the smallest amount that a float can represent.
+    """The times of two readings differ only by the smallest amount that a float can represent.
 
-    The second reading then gets a stamp that is 1 µs after the stamp of the first.
+    The driver increases the second stamp: it is 1 µs after the first stamp.
     """
     stamped = StampedReadings()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -33,11 +33,12 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 17])
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
-    """The boards restart, and each read brings the lines of up to half a second.
+    """Stamps in nanoseconds increase, even if a restart of the boards is read late.
 
-    So one read contains the first lines after a restart. Their stamps are almost equal: they differ
-    from the time of this read only by rounding errors. Rounded to nanoseconds, the stamps must
-    still increase.
+    A read may bring all lines of half a second, for example the first lines after a restart. The
+    driver does not know when these lines were sent, so their stamps are all close to the time of
+    the read. They differ only by rounding errors. Nevertheless, each stamp must be at least 1 ns
+    after the one before.
     """
     chance = random.Random(seed)
     bench = Bench()

@@ -26,7 +26,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 def late(chance: random.Random) -> float:
     """Return a random delay of a read, in s.
 
-    Usually, it is about 0.36 ms. For 1 % of the reads, it is up to 20 ms longer.
+    The delay is about 0.36 ms. One read in a hundred has an additional delay of up to 20 ms.
     """
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
@@ -42,9 +42,10 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Lines arrive late, and some are lost. Apart from a constant delay, the stamps are right.
+    """Lines arrive late, and some are lost. The stamps have only small errors.
 
-    99 % of the pose stamps are right within 0.05 ms, and 99 % of the IMU stamps within 0.2 ms.
+    A constant delay of all stamps is not counted as an error. 99 % of the errors are below 0.05 ms
+    for poses, and below 0.2 ms for IMU samples.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
@@ -97,9 +98,10 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """A board restarts soon after its start, so its times look almost like those of late lines.
+    """The clock notices that a board has restarted soon after its start.
 
-    The clock still notices the restart.
+    Such a restart is hard to notice: the board's time falls by only 0.6 s, so the new lines look
+    almost like late lines.
     """
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
@@ -113,11 +115,11 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 @pytest.mark.parametrize("waited_s", [0.012, 0.03, 0.2])
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
-    """The first line is read late. Afterwards, every read brings two lines, sent 20 ms apart.
+    """The clock becomes right, although its first line was read late.
 
-    At first, the clock takes the delay of the first line for the usual delay. So the newer line of
-    each read seems to arrive too early. The clock rejects the board times of at most three lines,
-    and is right afterwards.
+    Afterwards, every read brings two lines, which were sent 20 ms apart. At first, the clock takes
+    the delay of the first line for the usual delay. So the newer line of each read seems to arrive
+    too early. The clock rejects the times of at most three lines, and then it is right.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -131,10 +133,10 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 
 
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
-    """Every third board time is damaged: it is 0.1 s too large. The damaged times fit each other.
+    """Every third time from the board is damaged: it is 0.1 s too large.
 
-    But after each damaged time, a smaller, correct time comes. This shows the damage, and the clock
-    stays right.
+    The damaged times agree with each other, so they could be the times after a jump. But a correct,
+    smaller time follows each damaged time. So the clock rejects the damaged times, and stays right.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -168,9 +170,9 @@ def test_rare_reads_lose_no_odometry(seed: int) -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """If a stamp is not after the previous stamp, it is increased.
+    """The driver makes sure that each stamp is later than the previous stamp of the same kind.
 
-    A stamp in the future is set to the present time.
+    It also changes a stamp that is in the future: it sets the stamp to the present time.
     """
     stamped = StampedReadings()
     stamped.begin()
@@ -245,9 +247,10 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """A reading has an earlier stamp than the reading before it, which is of another kind.
+    """Stamps must increase only among extra readings of the same kind.
 
-    The stamp is not changed: stamps must increase only among readings of the same kind.
+    A reading has an earlier stamp than the reading before it, but this other reading is of another
+    kind. So the driver does not change the stamp.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -274,9 +277,10 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
-    """The host stalls, and then many lines arrive at once. Their times still increase.
+    """The host stalls. After the stall, many lines of the board arrive at once.
 
-    So the clock does not report a restart.
+    The board's times in these lines increase, as they did before. So the clock does not report a
+    restart.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -294,9 +298,9 @@ def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
 
 
 def numbered() -> Bench:
-    """Return a bench whose gyro and acceleration lines show the number of their board cycle.
+    """Return a bench on which each gyro or acceleration line shows when the board wrote it.
 
-    The number, divided by 1000, is the x value of the line.
+    The board counts its cycles. The x value of a line is the number of the cycle, divided by 1000.
     """
     bench = nominal()
     drive = bench.robot.drive
@@ -308,10 +312,10 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return, for each published sample, the cycles of its gyro line and its acceleration line.
+    """Return a pair for each published sample: the cycles of its gyro and its acceleration line.
 
-    A cycle is a period of the board. Each cycle is given as its number divided by 1000, as in the
-    lines from ``numbered``.
+    A cycle is a period of the board. It is given as its number divided by 1000, as in the lines of
+    the bench from ``numbered``.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
@@ -322,10 +326,10 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
-    """The driver reads every 100 ms, so each read has ten samples.
+    """The two lines of each published sample come from the same cycle of the board.
 
-    In the case "lost", 1 % of the lines is lost. In the case "twice", 1 % of the lines comes twice.
-    No published sample has lines of two cycles.
+    The driver reads every 100 ms, so each read has ten samples. In the case "lost", 1 % of the
+    lines is lost. In the case "twice", 1 % of the lines comes twice.
     """
     bench = numbered()
     chance = random.Random(5)

@@ -68,10 +68,11 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """The sensor and the driver are set to ranges of 2, 4, 8 or 16 g.
+    """The sensor and the driver are each set to a range of 2, 4, 8 or 16 g.
 
-    If the ranges differ, the driver measures a wrong gravity, and advises to set the sensor's
-    range. A further error of 8 % does not change the advice.
+    If the two ranges differ, the driver measures a wrong gravity. The advice is then to set the
+    parameter ``accel_range`` to the sensor's range. An additional error of 8 % does not change the
+    advice.
     """
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
@@ -81,7 +82,10 @@ def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_
 
 @pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
 def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
-    """The gravity measured at rest fits no range. The advice is to check range, bias and sensor."""
+    """No range of the sensor can explain the gravity that is measured at rest.
+
+    The advice is to check the range, the bias and the sensor.
+    """
     assert gravity_advice(gravity, 2).endswith(
         "check `accel_range` and `accel_bias`, or the sensor"
     )

@@ -34,9 +34,10 @@ RPM = math.tau / 60
 @pytest.mark.slow
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """After the port is opened, the driver writes low pass, periods and gains to the board.
+    """After the port is opened, the driver configures the board. Then the robot can be driven.
 
-    After that, the robot can be driven.
+    The driver writes the low-pass gain, the periods of the messages and the gains of the
+    controllers.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
@@ -51,9 +52,9 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
 
 @pytest.mark.slow
 def test_a_restarted_board_is_configured_again() -> None:
-    """The board restarts with a low-pass gain of 0, with which the wheels do not turn.
+    """The board restarts. Its low-pass gain is then 0, so the wheels do not turn.
 
-    The driver configures the board again.
+    The driver configures the board again, and the robot can be driven.
     """
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
@@ -73,9 +74,10 @@ def test_a_restarted_board_is_configured_again() -> None:
 
 @pytest.mark.slow
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
-    """The board restarts within a moment, without a silence.
+    """The board restarts so fast that the driver notices no silence.
 
-    The tick counters begin at zero, which shows the restart. The driver configures the board again.
+    The tick counters begin at zero again. This shows the driver that the board has restarted, so
+    the driver configures it again.
     """
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
@@ -115,10 +117,10 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 @pytest.mark.slow
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """The user wants lines without checksums, which value 4 of command 0x11 selects.
+    """The user wants lines without checksums. The driver selects them with value 4 of command 0x11.
 
-    The same command also overwrites the left wheel's "short correction", another setting of the
-    board. The driver then restores the value of this setting.
+    On the board, this command also overwrites another setting, the left wheel's "short correction".
+    So the driver writes this setting again.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver.confirmed:
@@ -161,9 +163,10 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """The firmware keeps the last speed of a wheel at rest, even if this prevents its next start.
+    """A robot that was stopped starts again at any speed.
 
-    The driver clears this speed, so the robot starts again, also without feed-forward.
+    After a stop, the firmware keeps the last speed of each wheel, which could prevent the next
+    start. The driver clears this speed. So the wheels start again, even without feed-forward.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings())
     rig.run(5.0)
@@ -176,10 +179,10 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 @pytest.mark.slow
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
+    """The driver sends RPM 0/0 after a Stop, because otherwise a slower set-point starts no wheel.
 
-    The robot drives at 30 RPM and is stopped. The firmware keeps the last measured speed, which RPM
-    0/0 would clear. In this test, RPM 0/0 is not sent. So a set-point of 8 RPM, without
+    The robot drives at 30 RPM and is stopped. The firmware keeps the last measured speed, and only
+    RPM 0/0 would clear it. In this test, nothing sends RPM 0/0. Then a set-point of 8 RPM, without
     feed-forward, does not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
@@ -215,9 +218,10 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
     [*(("firmware", kind) for kind in RecordKind), ("documented", RecordKind.TORQUE)],
 )
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The user requests a record, for example of the times between ticks, while the wheels turn.
+    """The user requests a record while the wheels turn, for example of the times between ticks.
 
-    The record arrives complete, and its times have the right unit for this kind of firmware.
+    The driver delivers all samples of the record. It also knows the unit of the times, which
+    depends on the firmware.
     """
     rig = Rig(nominal(firmware))
     rig.run(4.0)
@@ -239,10 +243,10 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("loss", "outcome"), [(0.0, RecordReading), (0.004, RecordFailed)])
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
-    """The clock of the public firmware stops for 0.12 s while the board sends a record.
+    """While a board with the public firmware sends a record, its clock stops for 0.12 s.
 
-    The driver does not take the next ticks for late, so ``odom`` has no jump some seconds later.
-    This is also true if lines of the record are lost.
+    So the time in the next tick report is 0.12 s behind. The driver does not regard this report as
+    late. Therefore ``odom`` does not jump some seconds later, even if lines of the record are lost.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)
@@ -288,9 +292,9 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """Data that is not from a LOIS ECU arrives. A notice names the likely sender of the data.
+    """Data that does not come from a LOIS ECU arrives. The advice names what probably sends it.
 
-    The notice ends at the first valid line.
+    The advice is removed when the first valid line arrives.
     """
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []

@@ -2,7 +2,8 @@
 
 """Tests of the period with which the board sends the GPS date, and of requests for one date.
 
-A request for one date confirms the board's settings, but it also ends the periodic dates.
+The driver requests one date to confirm the board's settings. This request has a side effect: the
+board no longer sends the date periodically.
 """
 
 import pytest
@@ -14,9 +15,10 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 class DeafBench(Bench):
-    """A bench in which one of the lines that set the date period does not reach the board.
+    """A bench that loses one of the lines that set the period of the date.
 
-    ``nth``: which of these lines is lost, counted from 1; 0: none.
+    ``nth``: number of the line that does not reach the board, counted from 1. With 0, no line is
+    lost.
     """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
@@ -37,10 +39,10 @@ class DeafBench(Bench):
 @pytest.mark.slow
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """A request for one date ends the periodic dates, so the driver sends the period again.
+    """A request for one date ends the periodic dates, so the driver sets the period again.
 
-    The driver repeats the line with the period several times. Whichever of these lines is lost, the
-    board has the period in the end.
+    The driver sends the line with the period several times. One of these lines is lost.
+    Nevertheless, the board has the right period in the end.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -52,9 +54,10 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """To confirm the settings, the driver requests one date. The request ends the periodic dates.
+    """The driver confirms the board's settings without a change of the user's date period.
 
-    The driver then restores the period that the user has set.
+    To confirm the settings, the driver requests one date. This request ends the periodic dates. So
+    the driver sets the period again afterwards.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

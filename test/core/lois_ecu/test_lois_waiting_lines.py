@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to a LOIS ECU while the robot drives: settings wait, but the LED's line is sent."""
+"""Tests of lines that wait while a LOIS ECU drives: settings must wait, the LED's line need not."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure
@@ -22,7 +22,7 @@ def switch_led(bench: Bench, on: bool) -> None:
 def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
     """Drive for ``seconds``.
 
-    Check at each step that the session's next wake-up is in the future.
+    At each step, check that the session needs its next wake-up later, not at once.
     """
     for step in range(round(seconds / 0.01)):
         if step % 10 == 0:
@@ -46,9 +46,10 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The settings stay unconfirmed, and the driver cannot repeat them while the robot drives.
+    """The board never confirms its settings. While the robot drives, the driver cannot repeat them.
 
-    The pacer is not woken all the time: the session's next wake-up is always in the future.
+    The pacer must not run again and again during this time. So the next wake-up of the session is
+    always in the future.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
@@ -72,11 +73,11 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """The LED is switched while the robot drives.
+    """While the robot drives, the LED's line comes at least 14.5 ms after a motion line.
 
-    The LED's line is sent at least 14.5 ms after a motion line. The board may miss all bytes for up
-    to 13 ms. If it missed the end of the motion line and the beginning of the LED's line, it could
-    read the remaining bytes as a wrong motion line.
+    The reason: the board may miss all bytes for up to 13 ms. If it missed the end of a motion line
+    and the beginning of the LED's line, it could read the other bytes of both as a wrong motion
+    line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

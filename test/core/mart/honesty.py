@@ -36,7 +36,10 @@ MOTIONS = 6
 
 
 def nees(bench: MartBench) -> float:
-    """Return the normalised squared error of the last published pose, relative to the true pose."""
+    """Return the normalised squared error of the last published pose.
+
+    The error is the difference between this pose and the true pose.
+    """
     told, truth = bench.odometry[-1], bench.truth
     yaw_rad = math.remainder(told.pose.yaw_rad - truth.yaw_rad, math.tau)
     error = np.array([told.pose.x_m - truth.x_m, told.pose.y_m - truth.y_m, yaw_rad])
@@ -46,7 +49,10 @@ def nees(bench: MartBench) -> float:
 
 
 def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[float]:
-    """Make a random drive, and yield the normalised squared error many times and at the end."""
+    """Make a random drive, and yield the normalised squared error at many times during the drive.
+
+    The last value is from the end of the drive.
+    """
     random = Random(seed)
     unequal = random.uniform(-0.04, 0.04)
     bench = MartBench(FIRMWARES[seed % 3], faults, seed=seed, motor_inequality=unequal).ready()

@@ -34,9 +34,10 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
-    """The gyro has no noise, so the heading hardly changes on a straight drive.
+    """On a straight drive with a gyro without noise, the driver does not report a failed IMU.
 
-    The driver steers a little, and the resulting heading changes show that the IMU works.
+    The heading hardly changes on such a drive, as if the IMU had failed. So the driver steers a
+    little. The changes of the heading that follow show that the IMU works.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -68,9 +69,9 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """On a slow network with losses, the driver checks the IMU before it starts a motion.
+    """Before the driver starts a motion, it checks the IMU, even on a slow network with losses.
 
-    The start reaches the server within 0.2 s after the end of the check, plus the delays of the
+    The start reaches the server at most 0.2 s after the end of this check, plus the delays of the
     network.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
@@ -91,10 +92,10 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """After a curve, the start of a forward drive is lost. The driver sends the start again.
+    """After a curve, the start of a forward drive is lost. So the driver sends the start again.
 
-    Until this second start, the server keeps the heading of the curve. This heading does not turn
-    the odometry.
+    Until the second start arrives, the server reports the heading at the end of the curve. The
+    odometry does not turn by this heading.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -119,9 +120,10 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By chance, the first heading in a forward drive equals the last one of the motion before.
+    """By chance, the first heading of a forward drive equals the last heading of the motion before.
 
-    The encoder shows that the drive has begun, so the heading is used.
+    So it could be an old heading. But the encoder shows that the drive has begun, and therefore the
+    driver uses this heading.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -160,7 +162,8 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
     """The robot reaches two goals within 10 cm and 6 degrees.
 
-    A twist command replaces the third goal.
+    Then a third goal is given. While the robot drives to it, a twist command comes. The robot obeys
+    this command instead.
     """
     bench = MartBench(firmware).ready()
     for x_m, y_m, yaw_rad in ((0.8, 0.4, 1.0), (0.0, 0.0, 0.0)):
@@ -177,9 +180,9 @@ def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
 
 
 def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> None:
-    """The server does not answer during a controlled move, so the covariance is large.
+    """During a controlled move, the server does not answer, so the driver does not know the motion.
 
-    After the move the covariance is small again.
+    Therefore the covariance is large. After the move it is small again.
     """
     bench = MartBench().ready()
     bench.go_to(1.5, 0.0, 0.0)

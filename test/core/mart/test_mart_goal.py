@@ -86,9 +86,10 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """The driver makes equal moves in a row, and many of them end with the same encoder count.
+    """The driver makes several equal moves, and many of them end with the same encoder count.
 
-    The odometry adds every move.
+    An equal count could be an old one, from the move before. Nevertheless, the odometry adds the
+    motion of every move.
     """
     bench, goal = MartBench(firmware).ready(), Pose()
     for _ in range(4):
@@ -124,7 +125,7 @@ def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: flo
 def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     firmware: Firmware,
 ) -> None:
-    """A new goal replaces the first one during a move.
+    """While the robot makes a move to a goal, the user gives a new goal.
 
     When the server has replied to this move, the driver begins the first move to the new goal at
     once.
@@ -144,9 +145,9 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
-    """During a docking, the user commands the goal from before the docking again.
+    """During a docking, the user repeats the goal that was commanded before the docking.
 
-    This cancels the docking: the driver stops the move to the dock at once.
+    This command cancels the docking: the driver stops the move to the dock at once.
     """
     bench = MartBench(firmware).ready()
     bench.go_to(0.0, 0.0, 0.0)
@@ -159,10 +160,10 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 
 
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
-    """Change the network: it loses some commands, and duplicates the next RST IMU.
+    """Change the network so that it loses some commands and duplicates the next RST IMU.
 
-    ``lost``: the network loses all commands that begin with one of these words. The copy of RST IMU
-    is late by 0.29 s, and the reply to the copy is late by another 0.29 s.
+    ``lost``: the network loses each command that begins with one of these words. The copy of RST
+    IMU arrives 0.29 s late. The reply to this copy is delayed by 0.29 s, too.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
@@ -203,10 +204,10 @@ def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
 def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     firmware: Firmware, before: tuple[float, float], stops_s: float | None
 ) -> None:
-    """The command for a goal's turn is lost. A late ok of the IMU check seems to confirm the turn.
+    """The command for the turn to a goal is lost. Then a late ok to an IMU check arrives.
 
-    The encoder still has the count of the motion before. The odometry does not add this count
-    again.
+    This ok must not confirm the turn. The encoder still shows the count of the previous motion, and
+    the odometry does not add this count again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
@@ -223,10 +224,10 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
-    """A backward drive's command is lost. A late ok of the IMU check seems to confirm the command.
+    """The command of a backward drive is lost. Then a late ok arrives, the reply to an IMU check.
 
-    The driver does not trust this ok, because the network has just duplicated replies. So the
-    odometry adds no motion.
+    The ok looks like a reply to the command. The driver does not trust it, because the network has
+    duplicated replies a short time before. So the odometry adds no motion.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 3.0)
@@ -269,9 +270,9 @@ def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> Non
 
 
 def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
-    """The dock ends a move early. The driver does not conclude that moves are short.
+    """The dock ends a move early. The driver must not learn from this that moves are short.
 
-    The next goal is behind the robot. The driver requests the usual distance for it.
+    The next goal is behind the robot. On the way to it, the driver requests the usual distance.
     """
     bench = MartBench(dock_m=0.2).ready()
     assert bench.job(Job.DOCK, "DOCK", 40).success
@@ -280,11 +281,12 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
-    """The server executes a move, and then a late copy of the move. The driver stops the copy.
+    """The server executes a straight move, and then a copy of it that the network delivers late.
 
-    The encoder then shows only how far the copy went. The driver knows from an earlier move how far
-    the complete move went before the copy, and adds this distance. Then it continues to the goal.
-    The stopped copy does not change the distances that the driver requests.
+    The driver stops the second run. Then the encoder shows only the distance of the second run. The
+    driver knows from earlier moves how far the first run went, and adds this distance. Then the
+    robot continues to the goal. The stopped run does not change the distances that the driver
+    requests for later moves.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)
@@ -319,10 +321,10 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 
 
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
-    """A goal is 30 m away. The driver stops the straight move after 80 s, which is about 20 m.
+    """A goal is 30 m away. After 80 s, or about 20 m, the driver stops the straight move.
 
-    From then on, the driver counts the moves to the goal from zero again. So a goal at any distance
-    can be reached.
+    From then on, the driver counts the moves to this goal from zero again. So the robot can reach a
+    goal at any distance, although the number of moves to a goal is limited.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

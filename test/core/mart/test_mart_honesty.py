@@ -12,10 +12,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("network", [name for name in NETWORKS if not name.startswith("late")])
 def test_odometry_is_no_farther_off_than_its_covariance_says(network: str) -> None:
-    """The robot makes drives of all kinds, with motors that differ by up to 4 %.
+    """The error of the odometry fits its covariance, in drives of all kinds.
 
-    The error of the odometry fits its covariance. One network only delays datagrams. It is not
-    tested, because the worst network delays them as much, and also loses and duplicates datagrams.
+    The motors differ by up to 4 %. The test has no network that only delays datagrams: the worst
+    network has the same delays, and also loses and duplicates datagrams.
     """
     drives = [list(drive(NETWORKS[network], seed)) for seed in range(3)]
     every = [value for each in drives for value in each]

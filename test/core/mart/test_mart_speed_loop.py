@@ -38,12 +38,13 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """The measured speed of a motor is right at 18 units, and too low at 26 units.
+    """A measurement above the line that the driver uses must not make the motor seem slower.
 
-    A straight line through both speeds would show motion at zero units, which is impossible. So the
-    driver uses another line, which shows no such motion. At 14 units, the speed of this line is too
-    low. Then the true speed at 14 units is measured. This measurement is higher than the line, so
-    it must not lower the line at 14 units.
+    The measured speed of a motor is right at 18 units, and too low at 26 units. A straight line
+    through both points would show motion at zero units, which is impossible. So the driver uses a
+    line without such a motion. At 14 units, the speed on this line is too low. Then the true speed
+    at 14 units is measured, which is above the line. This measurement must not lower the line at 14
+    units.
     """
     line = MotorLine()
     for _ in range(8):
@@ -58,9 +59,9 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     slope: float, dead: float, rate_radps: float
 ) -> None:
-    """The driver has measured a drive and a turn on the spot, and computes another turn.
+    """After a drive and a turn on the spot were measured, the driver computes a second turn.
 
-    The motors' units for this other turn are wrong by at most one.
+    The motors' units for the second turn are wrong by at most one.
     """
     settings = MartSettings()
     per_unit_mps = settings.speed_per_unit * slope
@@ -97,9 +98,9 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """The robot drives for a long time at one speed, which is measured with noise.
+    """The robot drives for a long time at one speed. Each measurement of this speed has noise.
 
-    The units for another speed change by at most 3.
+    The driver learns from these measurements. They change the units for another speed by at most 3.
     """
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
@@ -126,9 +127,10 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """A start does not move the robot. The next starts use three times as many units, at most 20.
+    """If the units of a start do not move the robot, the next start uses three times as many.
 
-    If a start with 30 units does not move the robot, the next starts do not use more units.
+    This increase ends at 20 units. If a start with 30 units does not move the robot, the next start
+    has at least 20, but fewer than 30 units.
     """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4
@@ -149,9 +151,9 @@ CHANGES = st.lists(
 def test_unanswered_changes_are_judged_by_the_measured_speeds(
     changes: list[tuple[int, int, bool]],
 ) -> None:
-    """Some changes of the motors' units are not answered, and each may have arrived or not.
+    """Some changes of the motors' units are not answered. Each of them may be lost or not.
 
-    From the wheels' speeds, the driver concludes which changes have arrived.
+    From the measured speeds of the wheels, the driver finds out which changes have arrived.
     """
     settings = MartSettings()
     loop, now = SpeedLoop(settings), 0.0

@@ -13,9 +13,9 @@ kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
 def nominal(imus: int) -> FrameSchedule:
-    """Return a schedule that has received all frames of nominal mode for 1 s.
+    """Return a schedule that has received all frames of nominal mode for 1 s, and more IMU frames.
 
-    ``imus``: number of IMU frames that it has received after that.
+    ``imus``: number of the IMU frames that follow this second.
     """
     rhythm = FrameSchedule()
     for _ in range(5):
@@ -35,17 +35,17 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """From the number of damaged bytes, the schedule infers the number of lost IMU frames.
+    """The frame schedule computes the number of lost IMU frames from the number of damaged bytes.
 
-    The damaged bytes can include a delta, which is not counted as an IMU frame.
+    The damaged bytes can include a delta. The schedule does not count this delta as an IMU frame.
     """
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
 def test_a_damaged_pose_is_not_an_imu_frame() -> None:
-    """A pose of 15 bytes is due. Instead, 14 damaged bytes arrive: the length of an IMU frame.
+    """A pose of 15 bytes is due, but 14 damaged bytes arrive. An IMU frame has 14 bytes, too.
 
-    They are not counted as a lost IMU frame.
+    Nevertheless, the schedule does not count these bytes as a lost IMU frame.
     """
     rhythm = nominal(0)
     for _ in range(5):
@@ -55,9 +55,10 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """An IMU frame is lost before a pose. The schedule cannot count it when the pose comes.
+    """An IMU frame directly before a pose is lost.
 
-    It counts the loss when the frame after the pose comes.
+    When the pose arrives, the schedule cannot count this loss yet. It counts the loss when the
+    frame after the pose arrives.
     """
     rhythm = nominal(0)
     for _ in range(4):
@@ -70,9 +71,10 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """After 30 IMU frames without another frame, only IMU frames can have been lost.
+    """If the last 30 frames were IMU frames, the board is in IMU-only mode.
 
-    So all damaged bytes are counted as lost IMU frames.
+    It sends no other frames in this mode. So the schedule counts all damaged bytes as lost IMU
+    frames.
     """
     rhythm = nominal(0)
     for _ in range(30):
@@ -82,9 +84,9 @@ def test_imu_frames_alone_are_all_that_was_lost() -> None:
 
 @given(st.lists(st.tuples(kinds, st.integers(0, 500))))
 def test_any_order_of_frames_is_borne(heard: list[tuple[type, int]]) -> None:
-    """Frames and damaged bytes come in any order.
+    """For any order of frames and damaged bytes, the schedule does not count too many lost frames.
 
-    At most one lost IMU frame is counted for each seven damaged bytes.
+    It counts at most one lost IMU frame for each seven damaged bytes.
     """
     rhythm = FrameSchedule()
     skipped = lost = 0

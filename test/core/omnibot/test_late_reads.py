@@ -45,7 +45,7 @@ def stopped(
 
     ``most``: largest number of bytes in a read.
 
-    ``piece``: number of bytes in each read before the pause.
+    ``piece``: number of new bytes for which the reader waits when it has read all bytes.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -66,7 +66,7 @@ def stopped(
 def heard(reads: Iterable[Read], begun: FrameDecoder | None = None) -> list[Frame]:
     """Return the frames of all reads.
 
-    ``begun``: a decoder that has already received the earlier reads.
+    ``begun``: a decoder that has already decoded the reads before these; None for a new decoder.
     """
     made, found, last_s = begun or FrameDecoder(), [], 0.0
     for data, now in reads:
@@ -77,9 +77,9 @@ def heard(reads: Iterable[Read], begun: FrameDecoder | None = None) -> list[Fram
 
 
 def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
-    """Return the frames of each reader.
+    """Return a list of frames for each reader.
 
-    The first reads, which are the same for all readers, are decoded only once.
+    The first reads are the same for all readers, so they are decoded only once.
     """
     lists = [list(reads) for reads in readers]
     made, found, common = FrameDecoder(), [], 0
@@ -93,9 +93,10 @@ def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """A reader reads promptly for 0.5 s. Then it pauses once, in one of five frames.
+    """A reader that pauses once loses no frame.
 
-    It pauses between two bytes, at any place in a frame. No frame is lost.
+    The reader reads promptly for 0.5 s. Then it pauses between two bytes. The test repeats this for
+    many places of the pause, which are distributed over five frames.
     """
     ticks = ticks_of(name)[: 62 + round(stop_s / TICK_S)]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -134,9 +135,10 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """After 24 equal frames, a reader is late at every read. No frame is lost.
+    """After 24 equal frames, each read is late. No frame is lost.
 
-    The later frames can have any content, but their acceleration is at least 1 g.
+    The later frames can have any content. There is one condition: the acceleration in them is at
+    least 1 g.
     """
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
@@ -164,9 +166,10 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """A reader pauses within the last frame, and then within the «Paused» text that follows.
+    """A reader pauses within the last frame before a pause of the board.
 
-    The decoder returns the frame and the text.
+    The reader then pauses again, within the text «Paused» that the board sends next. The decoder
+    returns both the frame and the text.
     """
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"
@@ -182,9 +185,10 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter delivers pieces of 8 bytes, so a piece may contain parts of two «Paused» texts.
+    """An adapter delivers pieces of 8 bytes. One piece may end a «Paused» text and begin the next.
 
-    The board is silent for a time between two texts. Nevertheless, all texts are returned.
+    The board is silent between these texts, so such a piece spans a silence. Nevertheless, the
+    decoder returns all texts.
     """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
@@ -194,10 +198,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The line is interrupted, so the end of one frame directly follows the beginning of another.
+    """The line is interrupted. So the end of a later frame follows the beginning of a frame.
 
-    The two parts together have the length of a frame. They are rejected, because of the pause
-    between them.
+    The two parts together have the length of one frame. The decoder rejects them nevertheless,
+    because there is a pause between them.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
@@ -214,7 +218,10 @@ def test_where_the_line_was_cut_a_pause_still_tells() -> None:
 
 
 def test_a_line_that_was_out_for_long_is_read_anew() -> None:
-    """The line is interrupted for 0.5 s within a frame. New bytes do not complete that frame."""
+    """The line is interrupted for 0.5 s in the middle of a frame.
+
+    The decoder discards this frame. It does not take the new bytes for the end of this frame.
+    """
     made = FrameDecoder()
     found = made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     other = ImuFrame((100, -70, -16300), (2, 3, 4))
@@ -240,15 +247,19 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""For each case, the reads that complete a delta, after its first two bytes.
+"""A dictionary of cases. In each case, several reads bring a delta, of which two bytes have already
+come.
 
-Each text is one read: the time in ms since the previous read, and the bytes that are read.
+Each text is one read: the time in ms since the previous read, and the bytes of the read.
 """
 
 
 @pytest.mark.parametrize("name", LATE_ENDS)
 def test_a_late_end_belongs_to_its_frame_where(name: str) -> None:
-    """The end of a delta is read late, as on a busy computer. The delta is returned."""
+    """The end of a delta is read late, as on a busy computer.
+
+    Nevertheless, the decoder returns the delta.
+    """
     made, ticks = FrameDecoder(), ticks_of("driving")[:96]
     found, now = [], 0.0
     for number, tick in enumerate(ticks):

@@ -17,8 +17,9 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: functions of the tick's number. They return the upper and the lower bound
-    of the tick's time, minus the true time, in s.
+    ``above``, ``below``: functions of the number of a tick. ``above`` returns how far the upper
+    bound of the tick's time is after the true time, in s. ``below`` returns the same for the lower
+    bound. It is negative if the bound is before the true time.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
@@ -31,9 +32,9 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """Only upper bounds of the ticks' true times are known.
+    """Only upper bounds of the ticks' times are known, because each tick is read with some delay.
 
-    The fitted clock follows the ticks with the smallest delay, and has the right slope.
+    The fitted clock follows the ticks with the smallest delay, and its slope is right.
     """
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
@@ -41,18 +42,18 @@ def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> N
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """The bounds of each tick are 0.1 ms before and 0.8 ms after its true time.
+    """Each tick has a lower bound 0.1 ms before its true time and an upper bound 0.8 ms after it.
 
-    The fitted clock is near the middle of them, 0.3 ms after the true time.
+    The fitted clock is near the middle of these bounds, about 0.3 ms after the true time.
     """
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """For 8 s, the bounds of a tick's time move away from the true time, by 0.1 ms per second.
+    """For 8 s, both bounds of the ticks' times drift away from the true times by 0.1 ms/s.
 
-    The error of the fitted clock stays below 0.5 ms.
+    The fitted clock follows this drift only a little: its error stays below 0.5 ms.
     """
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
@@ -67,9 +68,9 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """Every twentieth read is late. The lower bound that a late read gives is too high.
+    """Every twentieth read is late. From a late read follows a lower bound that is too high.
 
-    Such bounds do not raise the fitted line.
+    Such lower bounds do not raise the fitted line.
     """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
@@ -82,9 +83,9 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For 4 s, reads are slightly late. Their lower bounds contradict the upper bounds.
+    """For 4 s, reads are slightly late. Their lower bounds are then above the upper bounds.
 
-    The fit discards these lower bounds, because upper bounds always hold.
+    A tick is never later than its upper bound, so the fit discards these lower bounds.
     """
     _, late_s = followed(
         0.0,

@@ -26,7 +26,7 @@ pytestmark = interpreted_only
 WHOLE = SampleBoundary(0, 0.0, 13 * 10 / 115200)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 SETTLING = 40
-"""Number of ticks after which the clock can use its shortcut, if they all arrive on time."""
+"""Number of ticks that must arrive on time before the clock can use its shortcut."""
 Read = tuple[list[Reading], float, SampleBoundary | None]
 
 
@@ -81,8 +81,8 @@ surprises = st.tuples(
 )
 """Unusual reads, each followed by normal reads.
 
-Each is (the list of readings in the read, ticks since the previous read, delay in s,
-``SampleBoundary`` or None, number of normal reads that follow).
+Each element has five parts: the list of readings in the unusual read, the ticks since the previous
+read, the delay in s, a ``SampleBoundary`` or None, and the number of normal reads that follow.
 """
 
 
@@ -92,7 +92,7 @@ Each is (the list of readings in the read, ticks since the previous read, delay 
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """A normal start is followed by unusual reads. Their stamps do not depend on the shortcut."""
+    """Unusual reads follow a normal start. With and without the shortcut, the stamps are equal."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:

@@ -67,17 +67,20 @@ def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> N
 
 
 def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
-    """A user gives one link for each terminal. The links are used in the order of the terminals."""
+    """A user gives as many links as the board has terminals.
+
+    The first link leads to the first terminal, and the second link to the second terminal.
+    """
     links = [tmp_path / "a", tmp_path / "b"]
     with ServedBoard(ToyLines(), links=links) as served:
         assert [os.readlink(link) for link in links] == served.addresses
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """A user asks for symbolic links that cannot be made. The program refuses them.
+    """A user asks for symbolic links that cannot all be made. The program makes none of them.
 
-    The test has three cases: the board has fewer serial ports than links, a file already has the
-    name of a link, or the board has only a UDP port. The program never leaves another link behind.
+    There are three cases. The board has fewer serial ports than the user gives links. A file
+    already has the name of a link. The board has only a UDP port.
     """
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
@@ -117,9 +120,9 @@ def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -
 
 
 def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
-    """A board sends a datagram before any request has come.
+    """A board sends datagrams before a host has sent a request, so their address is unknown.
 
-    The datagram has no receiver, so it is dropped.
+    The simulator drops these datagrams and counts them.
     """
 
     class Talking(ToyServer):

@@ -18,9 +18,9 @@ MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def angle_line(rig: Rig) -> tuple[float, int, int]:
-    """Return the front angle in degrees, and the angle sensor's error flags and diagnosis.
+    """Return the front angle in degrees, the angle sensor's error flags, and its diagnosis bits.
 
-    The diagnosis is without the frame counter.
+    The bits of the frame counter are removed from the diagnosis.
     """
     _, degrees, errors, bits = rig.ask(FRONT, "fwli")[0].split()
     return float(degrees), int(errors, 16), int(bits, 16) & 0x7FF
@@ -30,9 +30,9 @@ def angle_line(rig: Rig) -> tuple[float, int, int]:
 
 
 def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
-    """After ``stop``, ``rc`` has no effect until ``start``.
+    """After ``stop``, the board ignores ``rc`` until ``start`` comes.
 
-    In the meantime, the heartbeats report -1 as the source of commands.
+    During this time, the heartbeats report -1 instead of the number of a command source.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.3 0")
@@ -88,9 +88,9 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
     boot_s: float, *, says_start: bool
 ) -> None:
-    """A half ignores input until its boot ends. Some firmware then sends a start line.
+    """A half ignores its input until its boot ends. Some firmware then sends a start line.
 
-    The time in the lines of a half counts from the beginning of its boot.
+    In all lines of the half, the time is counted from the beginning of the boot.
     """
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now
@@ -109,9 +109,9 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """The front half restarts. Brush and lift are off, and the half sends no angle.
+    """The front half restarts. This switches brush and lift off, and the half sends no angle.
 
-    The drive half keeps the last angle.
+    The drive half keeps the last angle that it has received, and drives on.
     """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 4")
@@ -137,10 +137,10 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """One half is silent, hung or unplugged for a time.
+    """One half is silent, hung or unplugged for a time. The other half sends as usual.
 
-    The other half sends as usual, and the robot drives on. A silent half still obeys commands. A
-    hung or unplugged half does not.
+    A silent half sends nothing but obeys commands. A hung or unplugged half does not obey commands.
+    In all cases, the robot drives on with its last command.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
@@ -156,9 +156,9 @@ def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
 
 
 def test_sums_can_begin_and_end_in_each_half() -> None:
-    """One half begins to send checksums while it runs, and later ceases to send them.
+    """The front half begins to send checksums while it runs, and later ends this.
 
-    The other half sends no checksums.
+    Its checksums do not change the lines of the drive half, which have none.
     """
     rig = Rig().booted()
     rig.board.befall("front", "sums-begin")
@@ -184,7 +184,11 @@ def test_faults_can_be_planned() -> None:
 
 
 def test_ports_can_be_swapped_and_ids_be_others() -> None:
-    """The two ports are swapped, or a half has another id. The ids in the heartbeats show this."""
+    """The ids in the heartbeats show which half is at a port.
+
+    In the first case, the two ports are swapped. In the second case, a half has another id than
+    usual.
+    """
     rig = Rig(swapped=True)
     rig.run(1.0)
     assert any(port == FRONT and " 90 " in text for _, port, text in rig.lines)
@@ -224,7 +228,10 @@ def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
     ],
 )
 def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> None:
-    """Each fault of the angle sensor changes its bit of the diagnosis, as listed in the manual."""
+    """Each fault of the angle sensor changes its own bit of the diagnosis.
+
+    The manual has a list of these bits.
+    """
     rig = Rig().booted()
     rig.board.befall("front", what)
     assert angle_line(rig)[1:] == (0, diagnosis)
@@ -255,7 +262,10 @@ def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
 
 
 def test_the_offset_of_the_sensor_is_configured() -> None:
-    """``fwoffset`` sets the zero of the front angle. A 1 as its second number reverses the sign."""
+    """``fwoffset`` sets the offset of the front angle and its sign.
+
+    The first number is the offset. If the second number is 1, the sign is reversed.
+    """
     rig = Rig(sensor_zero_deg=7.0, angle_noise_deg=0.0).booted()
     assert angle_line(rig)[0] == 0.0
     rig.say(FRONT, "fwoffset 0 1")
@@ -268,7 +278,7 @@ def test_the_offset_of_the_sensor_is_configured() -> None:
 
 
 def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
-    """``off`` cuts the power of both halves after a delay, unless ``on`` comes before that."""
+    """After ``off``, both halves lose their power when a delay is over. ``on`` cancels ``off``."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1")
     rig.say(DRIVE, "off 2")
@@ -285,7 +295,10 @@ def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
 
 
 def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> None:
-    """The drive half restarts during the delay of ``off``. The power then stays on."""
+    """The drive half restarts during the delay of ``off``.
+
+    It then forgets ``off``, so the power stays on.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "off 2")
     rig.run(0.5)
@@ -298,7 +311,10 @@ def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> 
 
 
 def test_options_reach_the_board_by_a_url() -> None:
-    """A URL has the same options and names of faults as the command line. All reach the board."""
+    """A URL can set the same options and faults as the command line.
+
+    All of them reach the simulated board.
+    """
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
         "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100&boot=0.05&no-start-line"

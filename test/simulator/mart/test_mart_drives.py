@@ -2,7 +2,8 @@
 
 """Tests of the public server's uncontrolled motions: F, B, RM, R and L.
 
-F and RM drive forward, B backward; R and L turn on the spot. SM stops F, B, R and L; SRM stops RM.
+The commands F and RM drive forward. B drives backward. R and L turn on the spot. SM stops F, B, R
+and L. SRM stops RM.
 """
 
 import pytest
@@ -14,7 +15,7 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind
 def test_rm_answers_in_71_ms() -> None:
     """The reply to RM, a forward drive, comes after 71 ms.
 
-    By that time the encoder shows that the wheel turns.
+    The encoder shows that the wheel already turns at this time.
     """
     rig = Rig()
     assert rig.ask("RM 30") == "ok"
@@ -23,9 +24,9 @@ def test_rm_answers_in_71_ms() -> None:
 
 
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
-    """The reply to F, a drive, comes after 220 ms. The reply to R, a spin, comes after 61 ms.
+    """The reply to the drive F comes after 220 ms, and the reply to the turn R after 61 ms.
 
-    F takes longer, because the server first measures the bias of the gyro.
+    F takes longer, because the server measures the bias of the gyro before this drive.
     """
     rig = Rig()
     assert rig.ask("F") == "ok"
@@ -36,10 +37,10 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """Some servers answer the start of a drive (RM) with a failure although the robot moves.
+    """Some servers answer the start of a drive (RM) with a failure, but the robot moves.
 
-    Such a server then assumes that no motion is in progress, so the stop SRM fails. Only MCS, the
-    direct control of the motors, stops the robot.
+    The server believes that no motion is in progress. So the stop SRM fails, and the robot moves
+    on. Only MCS, the direct control of the motors, stops it.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -59,9 +60,10 @@ def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
 
 @pytest.mark.parametrize("change", ["1 1", "-1 -1", "5 -5", "0 1", "40 40"])
 def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(change: str) -> None:
-    """RM, a forward drive, is started with speed -20, and the robot drives backward.
+    """RM usually drives forward. With the speed -20, it drives backward.
 
-    The speed change RMCS 0 0 has no effect. Any other RMCS stops a motor or drives it forward.
+    The speed change RMCS 0 0 then has no effect. Any other RMCS stops the motors or drives them
+    forward.
     """
     rig = Rig()
     rig.drive("RM -20")
@@ -80,9 +82,9 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """RM, a forward drive, is started with speed 200. The robot drives backward at 56 units.
+    """RM usually drives forward. With the speed 200, it drives backward at 56 units.
 
-    Even the smallest change of speed (RMCS) then drives it at full speed forward.
+    After that, even the smallest speed change (RMCS) makes the robot drive forward at full speed.
     """
     rig = Rig()
     rig.drive("RM 200")
@@ -102,9 +104,9 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 
 
 def test_a_stuck_motor_can_hang_rm() -> None:
-    """After a fast drive, one motor is stuck.
+    """After a fast drive, one motor is stuck. The next RM (a forward drive) hangs the server.
 
-    The next forward drive (RM) hangs the server while the other motor turns.
+    While the server hangs, it answers no command, and the other motor turns.
     """
     rig = Rig()
     rig.drive("RM 110")
@@ -120,9 +122,10 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """A motor is stuck. The forward drive RM fails without a reason.
+    """A motor is stuck, so the forward drive RM fails. The server gives no reason.
 
-    After the drive F has failed too, RM fails with F's reason, "start timedout".
+    Then the drive F fails with the reason "start timedout". After that, RM fails with this reason,
+    too.
     """
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
@@ -144,7 +147,10 @@ def test_rm_0_is_a_motor_that_does_not_turn() -> None:
     ("text", "seconds"), [("R", 0.6), ("L", 0.6), ("MCR 20", 0.6), ("F", 0.76), ("TF 12", 0.76)]
 )
 def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
-    """A motor is stuck, so a start fails. Then the motors are off, and no motion is in progress."""
+    """A motor is stuck, so the start of a motion fails.
+
+    After the failure, the motors are off, and no motion is in progress.
+    """
     rig = Rig(stuck="right")
     assert rig.ask(text) == "fail start timedout"
     assert rig.took_s == pytest.approx(seconds, abs=0.02)
@@ -205,7 +211,8 @@ def test_cs_5_minus_5_turns_left() -> None:
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
     """A speed change (CS or RMCS) cannot reverse a motor. It stops the motor instead.
 
-    If a motor would exceed full speed, the other motor becomes slower instead.
+    It cannot make a motor faster than full speed either. Then it makes the other motor slower
+    instead.
     """
     rig = Rig()
     rig.drive(start, 0.5)
@@ -214,7 +221,10 @@ def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int
 
 
 def test_rmcs_0_0_just_reads_the_angle() -> None:
-    """The speed change RMCS 0 0 changes no speed. It returns the angle, as the query RMRA does."""
+    """RMCS 0 0 is a speed change by zero. It changes no speed.
+
+    It only returns the angle, as the query RMRA does.
+    """
     rig = Rig()
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -282,7 +292,10 @@ def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
 
 @pytest.mark.parametrize(("start", "side"), [("F", "front_m"), ("B", "rear_m")])
 def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str) -> None:
-    """An obstacle ends the drives F and B without a message. Only the reply to SM reports it."""
+    """An obstacle ends the drives F and B, but the server does not send a message about it.
+
+    Only the reply to the stop SM reports the obstacle.
+    """
     rig = Rig(**{side: 45 * INCH_M})
     rig.drive(start, 10.0)
     assert not rig.moving
@@ -307,9 +320,9 @@ def test_an_obstacle_ends_rm_and_srm_tells() -> None:
 
 
 def test_backward_rm_sees_no_obstacle() -> None:
-    """The robot drives backward with RM, usually the command of a forward drive.
+    """RM with a negative speed drives backward. The server reads only the front sonar during RM.
 
-    The server does not read the rear sonar, and the robot hits the wall.
+    So it does not notice an obstacle behind, and the robot hits the wall.
     """
     rig = Rig(rear_m=20 * INCH_M)
     rig.drive("RM -20", 6.0)
@@ -318,9 +331,9 @@ def test_backward_rm_sees_no_obstacle() -> None:
 
 @pytest.mark.parametrize(("front_in", "stops"), [(19.5, False), (18.5, True)])
 def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
-    """A forward drive (RM) ends if an obstacle in front is nearer than 19 inches.
+    """A forward drive (RM) ends if the front sonar measures less than 19 inches.
 
-    The sonar measures whole inches.
+    The sonar measures whole inches: for an obstacle at 18.5 inches, it reports 18.
     """
     rig = Rig(front_m=front_in * INCH_M)
     rig.drive("RM 1", 0.3)
@@ -329,10 +342,10 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 
 @pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.5, True)])
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
-    """A backward drive (B) ends if an obstacle behind is nearer than 15 inches.
+    """A backward drive (B) ends if the rear sonar measures less than 15 inches.
 
-    The first sonar reading comes after the robot has moved 2 inches. So an obstacle 15.5 inches
-    behind ends the drive.
+    The robot has already moved 2 inches when the sonar measures for the first time. So an obstacle
+    that was 15.5 inches behind at the start also ends the drive.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)
@@ -344,9 +357,9 @@ def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
 def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
     volts: float, inequality: float
 ) -> None:
-    """The motors have no speed regulator.
+    """The motors have no speed regulator. So their speed is not the same for equal commands.
 
-    The speed at a given command depends on the battery voltage and on the motor.
+    It depends on the battery voltage and on the motor.
     """
     rig = Rig(volts=volts, motor_inequality=inequality)
     rig.drive("RM 40")
@@ -358,9 +371,9 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 
 
 def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
-    """MCS, the direct control of the motors, sets the motor registers, the right one first.
+    """MCS controls the motors directly: it sets the registers of the right and the left motor.
 
-    From then on, the server refuses a new MCS and all motions, until MSM comes.
+    After MCS, the server refuses another MCS and all motions until the command MSM comes.
     """
     rig = Rig()
     assert rig.ask("MCS 100 120") == "ok"
@@ -374,5 +387,8 @@ def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
 
 
 def test_the_firmware_is_what_is_played_by_default() -> None:
-    """By default the simulated controller behaves like the public server, not as in its manual."""
+    """By default, the simulated controller behaves like the public server.
+
+    The manual of the controller describes another behaviour in some points.
+    """
     assert Rig().server.quirks == FIRMWARE

@@ -125,9 +125,10 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 
 
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
-    """A change of speed (CS) lacks a number, and the robot is at rest.
+    """The speed change CS comes with one number instead of two while the robot is at rest.
 
-    The server refuses CS without reading its numbers, so it does not crash.
+    The server refuses it before it reads the numbers. So it does not crash, as it does during a
+    motion.
     """
     assert Rig().ask("CS 5") == "fail"
 
@@ -145,9 +146,10 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server restarts while the robot moves. SRM then fails: "no motion in progress".
+    """The server restarts while the robot moves. The new server knows of no motion.
 
-    Only a power cycle of the controller stops the motors.
+    So the stop SRM fails with "no motion in progress". Only a power cycle of the controller stops
+    the motors.
     """
     rig = Rig()
     rig.drive("RM 30")
@@ -175,10 +177,11 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """An obstacle in front is near. The front sonar measures three times, which delays its reply.
+    """A sonar measures three times if an obstacle is near. This makes its reply later.
 
-    The obstacle behind is farther away than the limit of the rear sonar, 15 inches. So the rear
-    sonar measures only once.
+    In this test, the obstacle in front is near, so the front sonar measures three times. The
+    obstacle behind is farther away than 15 inches, the limit of the rear sonar. So the rear sonar
+    measures once.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"
@@ -218,7 +221,7 @@ def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
 
 
 def test_a_motor_that_tripped_does_not_turn() -> None:
-    """The left motor has tripped and does not turn. The right motor turns."""
+    """The left motor has tripped, so it does not turn during a drive. The right motor turns."""
     rig = Rig(motor_status=8)
     rig.drive("RM 30")
     assert rig.server.chassis.left_mps == 0.0 < rig.server.chassis.right_mps

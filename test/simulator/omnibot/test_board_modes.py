@@ -42,9 +42,9 @@ def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
 
 @pytest.mark.slow
 def test_a_paused_board_counts_once_a_second() -> None:
-    """A paused board sends a text once a second.
+    """A paused board sends a «Paused» text with a number once a second.
 
-    The number in the text counts up to 255 and then continues with 0.
+    The number grows by 1 with each text, up to 255. After that it is 0.
     """
     board = booted(BoardSettings())
     assert run(board, 2.0) == b"Paused: 1 \nPaused: 2 \n"
@@ -98,9 +98,10 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """R sets the board's odometry and SEQ to zero. The board must then be woken again.
+    """R reboots the board. The board's odometry and sequence number are then zero.
 
-    The robot's true pose stays.
+    Only the board begins anew: the true pose of the robot does not change. The host must wake the
+    board again.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
@@ -130,10 +131,10 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A paused board reads the bytes of a motion frame as letters.
+    """A paused board does not obey motion frames. It reads their bytes as state letters.
 
-    The first frame contains R (0x52), which resets the board. The second frame contains P (0x50),
-    which starts it.
+    The first frame contains R (0x52), so the board resets. The second frame contains P (0x50), so
+    the board starts.
     """
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
@@ -158,7 +159,7 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
 
 
 def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
-    """A board that obeys letters within frames gets a frame with the letter P (0x50) twice.
+    """A board that obeys state letters within frames gets a frame with two P (0x50).
 
     The first P pauses the board, and the second P starts it again.
     """
@@ -203,10 +204,10 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 
 
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
-    """A board whose receiver looks for idle gaps discards an incomplete frame after a gap.
+    """A receiver that looks for idle gaps discards an incomplete frame after a gap.
 
-    A caller can give the bytes with their times of arrival. The simulated board then measures the
-    gap by these times. Without such times, it measures the gap in ticks.
+    A caller can give the simulated board the arrival times of the bytes. Then the board computes
+    the gap from these times. Otherwise it counts the ticks between two calls.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))
@@ -256,7 +257,10 @@ command_bytes = st.lists(
 @given(command_bytes, st.data())
 @settings(max_examples=60)
 def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:
-    """The same bytes come within one tick, in different chunks. The chunks make no difference."""
+    """The same bytes reach the board within one tick, in one chunk or in several chunks.
+
+    The chunks have no effect on what the board does.
+    """
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))
     whole, cut = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     whole.receive(stream)

@@ -39,7 +39,8 @@ class Ecu:
     def stands_for_good(self) -> None:
         """Wait until the robot has been at rest for 0.8 s.
 
-        By default, ``cmd_vel_timeout`` is shorter, so earlier commands have then expired.
+        By default, ``cmd_vel_timeout`` is shorter than this. So no earlier command is still in
+        effect.
         """
         since: list[int] = []
 
@@ -60,9 +61,9 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command a velocity at 10 Hz until the context ends. The context begins when the robot moves.
+    """Command a velocity at 10 Hz, from the call until the context ends.
 
-    ``vx`` is in m/s, and ``yaw`` in rad/s.
+    The body of the context begins when the robot moves. ``vx`` is in m/s, and ``yaw`` in rad/s.
     """
     with probe.commanding(vx, yaw):
         ecu.wait_for(lambda board: not board.standing)
