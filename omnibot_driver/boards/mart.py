@@ -92,7 +92,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's topics and services.
 
-    Return, for each type of reading, the function that publishes it.
+    Return a mapping: for each type of reading, the function that publishes readings of this type.
     """
     from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
 

@@ -49,7 +49,7 @@ NOT_AT_REST: Final = (
 class MartTopics:
     """The topics and services that only the MART controller has.
 
-    ``publish``: for each type of reading, the method that publishes it.
+    ``publish``: maps each type of reading to the method that publishes readings of this type.
     """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:

@@ -23,8 +23,8 @@ class Liveness:
         self.unheard_s, self.silence_s = traits.unheard_s, traits.silence_s
         self.heard_at = self.came_at = -math.inf
         self._silent_since: float | None = None
-        """Value of ``heard_at`` when a silence was last reported. While ``heard_at`` has this
-        value, the silence is not reported again."""
+        """The value that ``heard_at`` had when a silence was last reported. While ``heard_at``
+        still has this value, the same silence continues, so it is not reported again."""
 
     def begin(self, now: float) -> None:
         """Begin a new connection."""
@@ -32,10 +32,10 @@ class Liveness:
         self._silent_since = None
 
     def stalled(self, now: float) -> None:
-        """Count the board's silence from ``now`` on, because this process has stalled until now.
+        """Measure the board's silence from ``now`` on, because this process has stalled until now.
 
-        During the stall, the driver could not receive, so the board may have sent data. A silence
-        that was reported before the stall is not reported again.
+        During the stall, the driver could not receive, so it does not know whether the board sent
+        data. A silence that was reported before the stall is not reported again.
         """
         if self._silent_since == self.heard_at:
             self._silent_since = now
@@ -48,8 +48,8 @@ class Liveness:
     def is_silent(self, now: float) -> bool:
         """Return whether the board is silent.
 
-        It is silent if no bytes have arrived since the port opened, or if the last reading arrived
-        ``Traits.silence_s`` ago or earlier.
+        It is silent if no bytes have arrived since the port was opened. It is also silent if
+        ``Traits.silence_s`` or more have passed since the arrival of the last reading.
         """
         return self.came_at == -math.inf or now - self.heard_at >= self.silence_s
 

@@ -3,8 +3,8 @@
 """Computes when the board took each sample of its IMU, and converts the sample to SI units.
 
 The board's lines carry no sampling time, but the board takes a sample every 10 ms. So each sampling
-time is the *phase*, a constant time, plus a whole number of periods. The phase follows from the
-arrival times of the samples.
+time is a sum: a constant time, the *phase*, plus a whole number of periods of 10 ms. The driver
+finds the phase from the arrival times of the samples.
 
 Input: pairs of a gyro line and an acceleration line, formed by ``imu_pairs.py``.
 """
@@ -20,12 +20,12 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Limit of the time between the arrivals of two successive samples, in periods.
+"""Limit for the time between the arrivals of two successive samples, in sampling periods.
 
-The driver uses the limit only if both samples seem to be late by about a period or more. If the
-time between the arrivals is above the limit, the samples are not late: an earlier sample was lost.
-If the time is below the limit, both samples have waited because the host stalled, and no sample was
-lost.
+The driver uses this limit only if both samples seem to be late by about a period or more. If the
+time between the two arrivals is above the limit, the samples are not late: they only seem to be,
+because an earlier sample was lost. If the time is below the limit, the host has stalled. Both
+samples have then waited to be read, and no sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
@@ -38,7 +38,8 @@ class ImuSamples:
 
     ``unit``: unit in which the board sends accelerations.
 
-    ``rates``, ``forces``: the last sample in rad/s and in m/s²; NaN before the first.
+    ``rates``: the gyro rates of the last sample, in rad/s. ``forces``: the accelerations of the
+    last sample, in m/s². Before the first sample, both are NaN.
     """
 
     def __init__(self, unit: AccelerationUnit) -> None:
@@ -70,15 +71,17 @@ class ImuSamples:
     def sampled_s(
         self, arrived_s: float, not_before_s: float, next_pose_s: float, skipped: int
     ) -> float:
-        """Return when the board took the next sample, in s of the board's clock.
+        """Return the time at which the board took the next sample, in s of the board's clock.
 
-        ``arrived_s``: when the sample arrived, by that clock.
+        ``arrived_s``: arrival time of this sample, in s of the board's clock.
 
         ``not_before_s``: time of the last pose before the sample.
 
-        ``next_pose_s``: time of the pose that arrived next; infinity if none has arrived yet.
+        ``next_pose_s``: time of the pose that arrived next after the sample; infinity if no pose
+        has arrived since then.
 
-        ``skipped``: how many incomplete samples were left out since the previous sample.
+        ``skipped``: number of incomplete samples between the previous sample and this one. They
+        were left out.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -104,11 +107,14 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Set the phase of the sampling times, after a sample that arrived ``delay_s`` late.
+        """Update the phase of the sampling times after a new sample has arrived.
 
-        The new phase is the latest one with which no recent sample arrives before its sampling
-        time. The recent samples are the last three blocks of 100 samples, and all samples after
-        these blocks.
+        ``delay_s``: time in s from the sample's sampling time, computed with the old phase, to its
+        arrival.
+
+        The new phase is as late as possible. It must not be so late that a recent sample seems to
+        arrive before its sampling time. Recent samples are those of the last three blocks of 100
+        samples, and those that came after these blocks.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

@@ -2,9 +2,10 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-Poses are coarse: their smallest step, 1 mm in 20 ms, corresponds to 0.05 m/s. Wheel speeds are
-finer, but their sum drifts away from the pose. Therefore, the motion that the wheel speeds give is
-corrected towards the newest pose.
+Poses are coarse: they have steps of 1 mm. A step of 1 mm in 20 ms corresponds to 0.05 m/s. Wheel
+speeds are finer, but the motion that is summed up from them drifts away from the pose. Therefore,
+the driver computes each displacement from the wheel speeds, and corrects it towards the newest
+pose.
 """
 
 import math
@@ -15,17 +16,20 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects.
+"""Fraction of a difference that one displacement corrects.
 
-The driver uses this small fraction only if rounding of the pose can explain the difference.
+The difference is between a pose and the motion that the wheel speeds give. The driver uses this
+small fraction only if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
-"""Largest difference that rounding of the poses explains, in units of their last digit. Each of two
-poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
+"""Largest difference between a pose and the wheels' motion that rounding of the poses can explain.
+The unit is one unit of the poses' last digit. A displacement depends on two poses, and each of them
+can be wrong by half a unit. In addition, the robot's rotation mixes the errors along both axes."""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose from the wheels' motion, in m
-and rad. The motion that an acceleration of ``SPEED_UP_MPS2`` can cause is added to these limits."""
+"""``SLACK_M``, ``SLACK_RAD``: limits for the deviation of a pose from the wheels' motion, in m and
+rad. The driver adds to each limit the motion that an acceleration of ``SPEED_UP_MPS2`` can cause.
+It rejects a pose with a larger deviation."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -36,9 +40,9 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""Number of rejected poses in a row that prove that the board has begun a new coordinate frame.
+"""Number of successive rejected poses that prove that the board uses a new coordinate frame.
 
-Each of them must agree with the rejected pose just before it.
+Each of these poses must agree with the rejected pose just before it.
 """
 
 
@@ -88,10 +92,11 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
 
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement up to ``pose``; every 0.2 s, return also a PoseReading.
+        """Return the displacement from the previous pose to ``pose``, in a list.
 
-        The PoseReading contains the sum of all displacements. The sum includes every displacement,
-        even if the driver rejects it later.
+        The list is empty if there is no displacement (see ``pose``). Every 0.2 s, the list also
+        contains a PoseReading. The PoseReading is the sum of all displacements. The sum includes a
+        displacement even if the driver rejects it later.
         """
         displacement = self.pose(pose, now)
         if displacement is None:
@@ -103,10 +108,10 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
-        """Return the displacement up to ``pose``; None for a rejected pose.
+        """Return the displacement from the previous pose to ``pose``; None if ``pose`` is rejected.
 
-        The first pose since the driver began gives None, because there is no pose before it. The
-        first pose after a restart of the board gives a displacement of 0.
+        For the first pose after the start of the driver, the result is None too, because there is
+        no previous pose. For the first pose after a restart of the board, the displacement is 0.
         """
         before = self._pose
         if before is None:
@@ -154,9 +159,10 @@ class PoseOdometry:
         )
 
     def _rolled(self, seconds: float, now: float) -> Pose | None:
-        """Return the motion in ``seconds`` at the mean of the last two pairs of wheel speeds.
+        """Return the motion in ``seconds``, computed from the last two pairs of wheel speeds.
 
-        None if the speeds are too old, or if ``seconds`` exceeds ``FRESH_S``.
+        The speed of each wheel is the mean of its last two speeds. The result is None if the last
+        pair is too old, or if ``seconds`` exceeds ``FRESH_S``.
         """
         speeds = self._speeds
         if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:

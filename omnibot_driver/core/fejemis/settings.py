@@ -14,13 +14,15 @@ AccelerationUnit = Literal["m/s^2", "g"]
 class Written(Enum):
     """Settings that the driver can write to a board.
 
-    The value of each setting: the board's command, and how many numbers follow the command.
+    The value of each member is a pair: the command that writes the setting, and how many numbers
+    follow this command.
     """
 
     WHEELS = "confw", 5
     """Radii of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
     STEERING = "confs", 2
-    """Track in m, then the distance from the axle to the steered wheel in m, for both boards."""
+    """Two lengths in m, for both boards: the track, and the distance from the axle to the steered
+    wheel."""
     FRONT_WHEEL = "fwoffset", 2
     """Offset of the front wheel's angle in degrees, then 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4
@@ -43,9 +45,11 @@ class Written(Enum):
 class FejemisSettings:
     """The user's settings of the robot.
 
-    ``track_m``, ``wheelbase_m``: used until the boards report their own.
+    ``track_m``, ``wheelbase_m``: sizes in m that the driver uses until the boards report their own
+    sizes.
 
-    ``line_sums``: whether lines carry a checksum. With ``auto``, the heartbeats decide.
+    ``line_sums``: whether text lines carry a checksum. With ``auto``, the driver finds this out
+    from the heartbeats.
 
     ``allow_reverse``: whether to send negative speeds (docs/boards/fejemis.md).
 
@@ -53,7 +57,7 @@ class FejemisSettings:
 
     ``low_cell_v``: voltage per cell below which the battery is reported as low.
 
-    ``written``: values to write to the boards. Other values are only read.
+    ``written``: values that the driver writes to the boards. It only reads all other values.
     """
 
     track_m: float = 0.4

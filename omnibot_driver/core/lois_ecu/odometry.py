@@ -2,11 +2,11 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-At times, the public firmware does not count a wheel's ticks. ``motion_filter`` then predicts the
-motion from the commands, and ``comparison`` compares the prediction with the board's own odometry
-(0x20) to correct it.
+At times, the public firmware does not count the ticks of a wheel. During these times,
+``motion_filter`` predicts the motion from the commands. ``comparison`` corrects this prediction by
+the board's own odometry (0x20).
 
-Time is an argument. All times are arrival times in s.
+The caller passes the time. All times are arrival times in s.
 """
 
 import math
@@ -29,17 +29,19 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""Number of periods of the tick reports for which the pose is predicted after the last report. The
-pose is always predicted for at least ``UNHEARD_S`` s."""
+"""How long the driver predicts the pose after the last tick report, in periods of these reports. If
+this time is shorter than ``UNHEARD_S`` (in s), the driver predicts the pose for ``UNHEARD_S``."""
 LOST_REPORTS_S: Final = 1.2
-"""Limit in s for the length of a silence. If a silence is shorter and no set-point changed in it,
-the driver assumes that only reports were lost, and that the wheels followed their set-points."""
+"""Limit in s for the duration of a silence of the board. The driver uses it to decide what happened
+in the silence. If the silence was shorter and no set-point changed in it, the driver assumes that
+the wheels followed their set-points, and that only the reports were lost."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
-"""Largest count, in turns of the wheel, that can show a restart of the board while the robot is at
-rest. A larger count may come from a push. A count of one tick is always small enough."""
+"""Largest tick count, in turns of the wheel, that the driver takes for a sign of a restart while
+the robot is at rest. After a restart of the board, the counts begin at zero. A larger count may
+come from a push of the robot. A count of one tick is accepted even if it is above this limit."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -58,15 +60,16 @@ class LoisOdometry:
         self._begun = False
         self._estimated = False
         """Whether no time has passed since the last estimate. While this is true, the wheels keep
-        their ``blind`` flags. The reason: one read may contain the ticks that gave the estimate,
-        and then an odometry report. With the flags, this report can still correct the motion before
-        the estimate."""
+        their ``blind`` flags. They are needed if one read contains first the ticks that gave the
+        estimate, and then an odometry report. With the flags, the report can still correct the
+        motion before the estimate."""
         self._may_roll_mps = 0.0, 0.0
-        """Greatest possible speed of each wheel since the last report, in m/s."""
+        """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
         self._said: SetRpm | SetDuty | None = None
         self._said_at_s = -math.inf
-        """``_said``: last set-point. ``_said_at_s``: time in s at which it last changed."""
+        """``_said``: the last set-point that was sent. ``_said_at_s``: time in s at which the
+        set-point last changed."""
         self.configure(settings)
         self.reset()
         self.connect()
@@ -98,17 +101,20 @@ class LoisOdometry:
 
     @property
     def appends(self) -> bool:
-        """Whether the board sends odometry directly after ticks, as the public firmware does."""
+        """Whether the board sends each odometry report directly after a tick report.
+
+        The public firmware does this.
+        """
         return self._kind.appends
 
     @property
     def counting(self) -> bool:
-        """Whether the board counts the ticks of both wheels now."""
+        """Whether the board counts the encoder ticks of both wheels at present."""
         return self._motion.signed or all(wheel.course.counting for wheel in self._motion.wheels)
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """For each wheel: whether it is assumed to be at rest while it is commanded backward."""
+        """For each wheel: True if it is commanded backward, and is assumed to be at rest."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 
@@ -125,7 +131,7 @@ class LoisOdometry:
     def connect(self) -> None:
         """Begin a new connection.
 
-        The board's counters may have restarted, but the pose continues.
+        Before it began, the board's counters may have restarted. The pose continues nevertheless.
         """
         self._lost_s = max(self._heard_at_s, self._lost_s)
         self._ticks = None
@@ -145,11 +151,11 @@ class LoisOdometry:
         self._comparison.begin_counts()
 
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
-        """Return whether counts near zero can only come from a restart of the board.
+        """Return whether a restart of the board is the only explanation for counts near zero.
 
-        Only a restart explains the counts if they differ from the prediction by more than the
-        wheels can have rolled. If the robot is at rest, the counts must also be very small, because
-        larger counts may come from a push.
+        It is the only explanation if the counts differ from the predicted counts by more than the
+        wheels can have rolled. If the robot is at rest, there is a second condition: the counts
+        must be very small, because larger counts may come from a push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -163,9 +169,10 @@ class LoisOdometry:
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
         """Add an error to each wheel's distance, because the board may have restarted unnoticed.
 
-        The size of the error is the difference between the reported and the expected ticks. The
-        driver does not know the cause of this difference. It may be a restart, after which the
-        counts begin at zero. It may also be a true motion of the wheel.
+        The error of a wheel is the difference between its reported and its expected tick count.
+        This difference has two possible causes, and the driver does not know which one is true.
+        Either the board has restarted, and its counts have begun at zero, or the wheel has really
+        moved by the difference.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -253,10 +260,10 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """Process an odometry report, which corrects the next predictions and estimates.
+        """Process an odometry report. It corrects the predictions and estimates that follow.
 
-        According to the manual, the report is a message 0x20. The public firmware sends it as a
-        message 0x12 directly after the ticks.
+        According to the manual, an odometry report is a message 0x20. The public firmware sends a
+        message 0x12 instead, directly after the ticks.
 
         ``late_s``: how much later than usual the report arrived, in s.
         """
@@ -286,7 +293,10 @@ class LoisOdometry:
         return self.estimates.now(stamp_s, stamp_s - self._at_s, self._may_roll_mps)
 
     def _keep(self, now: float) -> None:
-        """Store the state after a report, in case a restart of the board is noticed later."""
+        """Store the state after a report.
+
+        The driver needs this state if it notices later that the board has restarted.
+        """
         self._heard_at_s, self._lost_s = now, -math.inf
         left, right = self._motion.wheels
         self._may_roll_mps = (
@@ -299,7 +309,8 @@ class LoisOdometry:
         """Return whether a report at ``now`` ends a silence in which the motion is unknown.
 
         The motion is known if the silence was shorter than ``LOST_REPORTS_S``, and no set-point
-        changed in it. Otherwise the board may not have received a new set-point.
+        changed in it. If a set-point changed, the motion is unknown, because the board may not have
+        received the new set-point.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if not now > heard_s + self._unheard_s > -math.inf:
@@ -309,9 +320,9 @@ class LoisOdometry:
         return not lost
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors of a silence in which the motion is unknown.
+        """Add errors to the wheels' distances after a silence in which the motion is unknown.
 
-        The wheels may have rolled on, because a Stop may have been lost in the silence.
+        In the silence, a Stop may have been lost. The wheels have then rolled on.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:

@@ -36,12 +36,13 @@ LINE_S: Final = 0.02
 # For up to 13 ms, the board may receive nothing. Without a pause, the beginning of a motion command
 # and the end of another line could form a new motion command.
 AFTER_MOTION_S: Final = 0.015
-"""Shortest time in s from a motion command to a command that is not a setting, for example for the
-LED. The time between two set-points is longer, so such a command can be sent between them."""
+"""Shortest time in s from a motion command to a *side command*. Side commands are neither motion
+commands nor settings: for example, a command for the LED. The time between two set-points is
+longer, so the driver can send a side command between them."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s from a tick report to the next round of settings, or to a request for a date. The
-board cannot receive while it sends. With a constant delay, each round could fall into a time in
-which the board sends. So the driver uses these delays in turn."""
+"""Delays in s after a tick report. After such a delay, the driver sends the next round of settings,
+or requests a date. It uses the delays in turn, because the board cannot receive while it sends:
+with one constant delay, every round could arrive while the board sends."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
@@ -67,8 +68,8 @@ class SettingsWriter:
         self._in_period = self._answered = False
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
-        """Commands that are not settings, for example for the LED, each with its earliest sending
-        time. They are still sent if the board restarts."""
+        """Commands that are not settings, for example for the LED. Each has the earliest time at
+        which it may be sent. If the board restarts, the driver still sends these commands."""
         self._rounds_left = 0
         self._round_at_s = math.inf
         self._date_asked_at_s, self._dates_asked = -math.inf, 0
@@ -140,8 +141,8 @@ class SettingsWriter:
     def repeat(self, now: float) -> None:
         """Write all settings again, as soon as no motion is commanded.
 
-        The caller calls this method if a wheel does not start. The board may then have no low-pass
-        coefficient, because all lines that write it were lost.
+        The caller calls this method if a wheel does not start. A possible cause is that all lines
+        with the low-pass coefficient were lost, so the board does not have this coefficient.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
@@ -175,7 +176,8 @@ class SettingsWriter:
     def ticks_came(self, now: float) -> None:
         """Record the arrival of ticks, and check whether they come with the period in the settings.
 
-        While the settings are unconfirmed, this method also plans the next round of settings.
+        While the settings are unconfirmed, this method also decides when the next round of settings
+        is sent.
         """
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
@@ -209,7 +211,11 @@ class SettingsWriter:
         return outbound.lines(*found, with_sum=self.settings.with_sum)
 
     def _begin_round(self, now: float) -> None:
-        """Queue all settings, if another round is left and the previous round has been sent."""
+        """Queue all settings for the next round.
+
+        Do nothing if no round is left, or if some commands of the previous round still wait to be
+        sent.
+        """
         if self._queue or not self._rounds_left:
             return
         self._rounds_left -= 1
@@ -224,12 +230,14 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round, in an order that changes from round to round.
 
-        A board may send one report in each round. If the order of the commands were constant, this
-        board could miss the same line in each round.
+        The order changes because the board receives nothing while it sends. A board may send one
+        report in each round, always at the same time. If the order were constant, this board could
+        miss the same line in each round.
 
-        The request for a date comes last. The board answers this request at once, and receives
-        nothing while it sends. So it would miss a setting that follows directly. Pauses between the
-        lines do not prevent this, because a busy computer may write all lines of a round together.
+        The request for a date comes last. The board answers it at once, and receives nothing while
+        it sends the answer. So it would miss a setting that follows the request directly. Pauses
+        between the lines would not help, because a busy computer may write all lines of a round
+        together.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order

@@ -2,12 +2,12 @@
 
 """Corrections of one wheel's estimated motion by the speeds that a LOIS ECU reports for the wheel.
 
-The board measures a wheel's speed only at the wheel's ticks. Two errors follow from this:
+The board measures a wheel's speed only at the wheel's encoder ticks. Two errors follow from this:
 
 - While a wheel is at rest, the board keeps reporting its last speed.
-- While the board sends, it notices ticks late, and measures a wrong speed.
+- While the board sends, it notices ticks late, and therefore measures a wrong speed.
 
-This module works on reported speeds and the motion filter, without messages.
+This module knows reported speeds and the motion filter; it does not know messages.
 """
 
 import math
@@ -18,11 +18,12 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Assumed age in s of the values in an odometry report when its last line arrives. The board takes
-these values before it sends the first line."""
+"""Age in s that the driver assumes for the values in an odometry report when the report's last line
+arrives. The values are that old because the board takes them before it sends the first line."""
 DOUBT: Final = 3.0
-"""Difference between the reported and the expected value, in standard deviations, above which the
-filter increases the variance of its estimate."""
+"""Limit for the difference between a value that the board reports and the value that the filter
+expects, in standard deviations. Above this limit, the filter increases the variance of its
+estimate."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used. A slower wheel may have rested between its last two
 ticks."""
@@ -32,23 +33,24 @@ SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
 """``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, from one reported
-speed to the next. A larger change is an error of measurement, because a tick was noticed late."""
+speed to the next. A larger change is not real: the board has noticed a tick late, and therefore
+measured a wrong speed."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported
-and an expected speed. This limit applies only while the set-point is constant, and only if the user
-has set the controller's gains."""
+and an expected speed. The driver uses this limit only if two conditions are true: the set-point is
+constant, and the user has set the controller's gains."""
 COASTED_TICKS: Final = 1.0
-"""Number of ticks to subtract from the distance of a wheel that came to rest. Such a wheel has
-rolled less far than its last speed suggests."""
+"""Number of ticks that the driver subtracts from a wheel's distance when the wheel has come to
+rest. The wheel has rolled less far than its last reported speed suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a speed controller while its wheel does not tick. The unit is
-``WINDUP_M``: the controller of a wheel at rest integrates the speed error, and starts the wheel
-when the integral reaches ``WINDUP_M``."""
+"""Largest value that the driver assumes for the integral of a wheel's speed controller while the
+wheel does not tick. The unit is ``WINDUP_M``. While a wheel is at rest, its controller integrates
+the speed error. When the integral reaches ``WINDUP_M``, the controller starts the wheel."""
 
 
 class ReportedSpeed:
@@ -64,15 +66,15 @@ class ReportedSpeed:
         self._repeats = 0
         self._jumped = False
         self._doubted_m = 0.0
-        """Standard deviation in m that was added to the wheel's distance since the wheel's reported
-        speed last changed. The reason for this addition: the wheel may have been at rest since that
-        change."""
+        """Standard deviation in m that the driver has added to the wheel's distance since the
+        wheel's reported speed last changed. The driver adds it because the wheel may have been at
+        rest since that change."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
         """Pass the wheel's estimated speed to ``resting``, because the board has reported no speed.
 
-        ``duration_s``: time in s, until now, for which the board has reported no speed.
+        ``duration_s``: for how long the board has reported no speed, in s.
         """
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
@@ -81,9 +83,10 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance added since it stopped.
 
-        The driver usually assumes that the wheel stopped when its reported speed last changed. But
-        a command to start may have come after this change. If the wheel did not obey this command,
-        the driver assumes that the wheel stopped at the time of the command.
+        Usually, the driver assumes that the wheel stopped when its reported speed last changed.
+        There is one exception: after this change, the driver may have sent a command to start,
+        which the wheel did not obey. In this case, the driver assumes that the wheel stopped at the
+        time of the command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -175,12 +178,12 @@ class ReportedSpeed:
                 self._doubt_rolling(resting.chance)
 
     def _doubt_rolling(self, chance: float) -> None:
-        """Add the error of a wheel that may be at rest, but is estimated as rolling.
+        """Add an error to the distance of a wheel that is estimated as rolling, but may be at rest.
 
-        If the wheel is at rest, the whole distance since its reported speed last changed is wrong.
-        This error grows from report to report, so the errors of successive reports are not
-        independent. The board's odometry (0x20) does not show the error, because the board also
-        computes with the old speed.
+        If the wheel is at rest, the whole distance that was added since its reported speed last
+        changed is wrong. This wrong distance grows from report to report, so the errors of
+        successive reports are not independent. The board's odometry (0x20) does not show the error,
+        because the board also computes with the old speed.
 
         ``chance``: probability that the wheel is at rest.
         """
@@ -191,7 +194,8 @@ class ReportedSpeed:
             self._doubted_m = wrong_m
 
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel's estimate by its mean speed between the last two ticks."""
+        """Correct the wheel's estimate by the mean speed that the wheel had between its last two
+        ticks."""
         motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
         push = estimate.mean[base + PUSH]
         lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)

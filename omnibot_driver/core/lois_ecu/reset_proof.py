@@ -2,9 +2,9 @@
 
 """Proof, by the tick counts, that the board has obeyed a reset.
 
-A count near zero is not enough: it may have been near zero before.
+A count near zero after the reset proves nothing if the count was also near zero before the reset.
 
-This module works on counts and times.
+This module knows counts and times.
 """
 
 import math
@@ -15,31 +15,33 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 # A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
 FEW_TURNS: Final = 0.3
 FEW_TICKS: Final = 2
-"""``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS`` ticks: the largest motion that is assumed for
-a wheel after it was stopped, 0.4 s at 50 RPM."""
+"""``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS`` ticks: the longest distance that a wheel is
+assumed to roll after it was stopped. At 50 RPM, the wheel needs 0.4 s for it. A count up to this
+value is regarded as near zero."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
-"""``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: a motion that no wheel can make
-between a reset and the next counts. If a count falls by at least this motion, and is then near
-zero, the board has obeyed the reset."""
+"""``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: a distance that no wheel can roll
+between a reset and the next counts. The board has obeyed the reset if a count has fallen by at
+least this distance, and is then near zero."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count before a reset
-that proves the reset of a robot at rest, if both counts are zero afterwards. Backlash of the gears
-can cause smaller changes."""
+"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count that can prove the
+reset of a robot at rest. The reset is proved if a count was at least this large before the reset,
+and both counts are zero afterwards. A smaller change may come from the backlash of the gears."""
 UNPROVED_S: Final = 2.5
-"""Time in s after which the driver accepts counts near zero without a proof. No proof is possible
-if the counts were already near zero before the reset."""
+"""Time in s for which the driver waits for a proof. After this time, it accepts counts near zero
+without a proof, because there may be none: if the counts were already near zero before the reset,
+no proof is possible."""
 
 
 class ResetProof:
     """Search for a proof that the board has obeyed a reset.
 
-    ``before``: counts when the reset was sent, None if unknown.
+    ``before``: the counts when the reset was sent; None if they are unknown.
 
-    ``steady``: whether these counts had not changed for some time, so that the wheels were at rest.
+    ``steady``: whether ``before`` had not changed for some time. If so, the wheels were at rest.
 
-    ``ticks_per_revolution``: may be changed at any time.
+    ``ticks_per_revolution``: encoder ticks for one turn of a wheel. It may be changed at any time.
     """
 
     def __init__(self, before: Ticks | None, ticks_per_revolution: int, *, steady: bool) -> None:
@@ -49,10 +51,11 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Record that the reset is repeated, with the counts ``before`` this repetition.
+        """Record that the driver repeats the reset.
 
-        The new counts replace the earlier counts only if the new counts can prove the reset. They
-        can prove it if they are not near zero, and the wheels are at rest.
+        ``before``: the counts at the time of the repetition. They replace the earlier counts only
+        if they can prove the reset. For this, two conditions must be true: the wheels are at rest
+        (``steady``), and the larger count is not near zero.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady
@@ -61,8 +64,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the result of the reset now.
 
-        The counts must be near zero. Until ``UNPROVED_S`` has passed, they must also prove the
-        reset.
+        The counts ``ticks`` must be near zero. They must also prove the reset, but only until
+        ``UNPROVED_S`` has passed. After this time, no proof is necessary.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -15,8 +15,7 @@ from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 LEAST_LIKE: Final = 0.65
 """Smallest measured distance or turn of a complete move, as a fraction.
 
-It is a fraction of the smaller one of two values: the requested distance or turn, and the expected
-distance or turn.
+The measured value is divided by the requested or the expected one, whichever is smaller.
 """
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
@@ -24,27 +23,30 @@ SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 The word SLOW in a request doubles the times per degree and inch.
 """
 FULL, TWO = 0.6, 1.4
-"""Shortest durations of one and of two complete runs of a move, as fractions of the usual one."""
+"""``FULL``: shortest duration of one complete run of a move. ``TWO``: shortest duration of two
+complete runs. Both are fractions of the move's usual duration."""
 LEAST_CUT_M, LEAST_CUT_RAD = 0.1, math.radians(15.0)
-"""Smallest request, in m or rad, for which the encoder count shows an incomplete run."""
+"""Smallest requested distance in m, and smallest requested turn in rad, for which the encoder count
+can show that the run was incomplete."""
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    A duplicate of the request may have started a second run of the same move.
+    The network may have duplicated the request. The duplicate starts a second run of the same move.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, they are
-    the distance and turn of the second run alone.
+    ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, only
+    this run is measured.
 
     ``lasted_s``: time in s from the request to the reply.
 
     ``quiet_s``: longest possible duration of a second run, in s.
 
-    ``completed``: whether the server reported success, and no stop ended the move.
+    ``completed``: True if the server reported success, and no stop ended the move.
 
-    ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
+    ``expected``: distance in m, or turn in rad, of a complete run. The driver has learned it from
+    earlier moves.
 
     ``stopped_again``: whether the driver has sent a stop after the move, to end a possible second
     run.
@@ -61,7 +63,7 @@ class Done:
 
     @property
     def is_straight(self) -> bool:
-        """Whether the move is straight; else it is a turn on the spot."""
+        """Whether the move is straight. If it is not, it is a turn on the spot."""
         return self.request.word in (TF, TB)
 
     @property
@@ -102,16 +104,16 @@ class Done:
 
     @property
     def went_the_wrong_way(self) -> bool:
-        """Whether the right wheel has turned far against the direction of the request."""
+        """Whether the right wheel has turned clearly against the requested direction."""
         seen = self.way_m if self.is_straight else self.turned_rad
         return (seen if self.request.word in (TB, MCR) else -seen) > self._least
 
     @property
     def contradicts_the_server(self) -> bool:
-        """Whether the encoder contradicts the server, which has reported a completed turn.
+        """Whether the encoder shows a wrong turn, but the server has reported a completed turn.
 
-        The encoder contradicts the server if the right wheel has turned much less or much more than
-        the turn requires. The server ends a turn by the gyro, so it may not notice a wheel that is
+        The turn was wrong if the right wheel has turned much less or much more than the turn
+        requires. The server ends a turn by the gyro. Therefore, it may not notice a wheel that is
         stuck or slips.
         """
         if self.is_straight or not self.completed or not self.is_large:
@@ -120,7 +122,7 @@ class Done:
 
     @property
     def may_have_run_twice(self) -> bool:
-        """Whether the server may have run the move twice, from a duplicated datagram."""
+        """Whether the server may have run the move twice, because its request was duplicated."""
         no_time = self.quiet_s < FULL * self.usual_s and not self.ended_late
         if self.stopped_again:  # the stop may have cut the second run short
             return not (no_time and self._seen >= self.asked)
@@ -128,20 +130,20 @@ class Done:
 
     @property
     def has_run_twice(self) -> bool:
-        """Whether the server has run the move twice.
+        """Whether the measurements show that the server has run the move twice.
 
-        The first run was complete. The driver has stopped the second run.
+        In this case, the first run was complete, and the driver has stopped the second run.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
 
     @property
     def ended_late(self) -> bool:
-        """Whether the reply came so late that the move may have run twice.
+        """Whether the reply came so late that the server may have run the move twice.
 
-        If the network has duplicated the request, the server runs the move twice. The reply may
-        then be the answer to the second run, because the network has lost the answer to the first
-        run.
+        If the network has duplicated the request, the server runs the move twice, and answers each
+        run. If the network has then lost the answer to the first run, this reply is the answer to
+        the second run.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -149,7 +151,8 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply belongs to another request. After this reply, the driver may have sent a stop
-        to end a possible second run. If so, this stop has in fact ended the first run.
+        Such a reply is the answer to another request. The driver did not know this. So after the
+        reply, it may have sent a stop to end a possible second run. This stop has in fact ended the
+        first run.
         """
         return self.lasted_s < FULL * self.usual_s

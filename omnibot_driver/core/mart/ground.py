@@ -40,28 +40,28 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Least time in s from a server's first reply after an absence to the start of a motion.
+"""Shortest time in s from the first reply of a server that was absent to the start of a motion.
 
-While a server starts up, VOLTS and most motion commands crash it. If the command is RM (forward
-drive), the motors stay on after the crash.
+The server may just have been started. While it starts up, VOLTS and most motion commands crash it.
+If RM (forward drive) crashes it, the motors stay on after the crash.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Silence after which the server is regarded as absent.
+"""Time without a reply after which the driver regards the server as absent.
 
-The silence is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
+The time is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
 """Largest number of unanswered HELLO queries for which the driver still expects answers. If more
-queries are unanswered, it expects answers to the newest ones only."""
+queries are unanswered, it expects answers to the newest MOST_GREETINGS queries only."""
 HEADING_S, HEADING_TRIPS = 1.0, 5
 NO_HEADING: Final = (
     "the server does not report the relative heading (RMRA) of the robot at rest, so the heading of"
     " the odometry is uncertain: check the network and the server"
 )
 PRESENT_S: Final = 0.35
-"""Longest silence of a server after which it has certainly not been restarted.
+"""Longest time without a reply in which the server cannot have been restarted.
 
-The silence is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
+The time is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
@@ -69,11 +69,12 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""Silence in s after which a server whose stop port has hung may have been restarted."""
+"""Time without a reply, in s, after which the server may have been restarted. This limit applies to
+a server whose stop port hangs."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
-Only a restarted server answers HELLO during the move.
+During the move, a server does not answer HELLO. An answer therefore shows that it was restarted.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
@@ -87,11 +88,12 @@ class Ground:
 
     ``readings``: readings that the caller has not taken yet.
 
-    ``heard_s``: time of the last reply. ``appeared_s``: time of the first reply after an absence.
+    ``heard_s``: time of the server's last reply. ``appeared_s``: time of the server's first reply
+    after an absence.
 
-    ``greeted``: whether the first stop of this connection was answered.
+    ``greeted``: whether the server has answered the first stop of this connection.
 
-    ``settings`` may be replaced.
+    ``settings``: the sizes and scales of the robot; may be replaced.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -181,7 +183,7 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that is in progress, or that the server may run twice.
+        """Start time of a controlled move that is in progress, or that the server may run again.
 
         None if there is no such move. During a controlled move, the server reports no measurements,
         so the driver is blind.
@@ -213,7 +215,7 @@ class Ground:
     def _seems_present(self) -> bool:
         """Whether replies show that the server was not restarted since the last start command.
 
-        The replies show this if each silence between two of them was too short for a restart.
+        They show this if no silence between two successive replies was long enough for a restart.
         """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
@@ -221,8 +223,8 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply. Decide whether the server may have been restarted.
 
-        A restart before this reply is possible if there was a long silence before it, or if the
-        previous replies came from another kind of server.
+        There are two signs of a restart: a long silence before this reply, or previous replies from
+        another kind of server.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
@@ -269,19 +271,21 @@ class Ground:
 
     @property
     def _rolled_out(self) -> bool:
-        """Whether the odometry includes the distance coasted after the last motion."""
+        """Whether the odometry includes the distance that the robot has coasted after its last
+        motion."""
         odometry = self.odometry
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        The driver must wait only after a forward drive (RM). The first encoder count at rest ends
-        the drive in the odometry. The odometry then needs a heading that was measured at rest, so
-        the heading must come before this count.
+        The driver must wait only after a forward drive (RM). In the odometry, the first encoder
+        count at rest ends this drive. When the drive ends, the odometry needs a heading that was
+        measured at rest. Therefore, the driver must receive this heading before it reads the
+        encoder.
 
-        The driver waits for at most HEADING_S, plus HEADING_TRIPS times the duration of a query. If
-        no heading has come by then, it logs NO_HEADING once.
+        The driver waits for at most HEADING_S (s), plus HEADING_TRIPS times the duration of a
+        query. If no heading has come by then, it logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE
@@ -299,7 +303,7 @@ class Ground:
             raise AssertionError(f"{word.text} must not be sent while {self.state.value}")
 
     def _send(self, said: tuple[Word, ...], now: float) -> Packets:
-        """Return the packets with these commands, and record when they are sent.
+        """Return the packets with the commands ``said``, and record that they are sent at ``now``.
 
         The driver does not wait for the replies to these commands.
         """

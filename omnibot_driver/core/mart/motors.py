@@ -15,7 +15,8 @@ from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_UNITS: Final = 127
 SLOWEST_TURN_RADPS: Final = 0.01
-"""Slowest turn on the spot, in rad/s, from which the driver learns about the motors' speeds."""
+"""Smallest rate of a turn on the spot, in rad/s, from which the driver learns the motors'
+speeds."""
 UNEQUAL: Final = 0.04
 """Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
@@ -65,15 +66,15 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
-        ``seen_radps``: the measured rate of the current turn, which uses ``units``. This method
-        does not store what ``seen_radps`` shows; the method ``spun`` does this.
+        ``seen_radps``: the measured rate of the turn in progress, in which both motors have
+        ``units``. This method does not store what this rate shows; the method ``spun`` stores it.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
         return _units(lines, self._spin_speed(rate_radps))
 
     def spun(self, units: int, rate_radps: float) -> None:
-        """Learn from a turn on the spot with ``units`` and the mean rate ``rate_radps``."""
+        """Learn from a turn on the spot with ``units``. ``rate_radps`` is its mean rate."""
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
             _learn_spin(self._lines, units, self._spin_speed(rate_radps))
 
@@ -82,7 +83,7 @@ class Motors:
         return copy.copy(self._right_line), copy.copy(self._left_line)
 
     def restore(self, lines: Lines) -> None:
-        """Forget what the driver has learned since ``lines()`` returned these ``lines``."""
+        """Forget what the driver has learned since the method ``lines`` returned ``lines``."""
         for line, before in zip(self._lines, lines, strict=True):
             line.restore(before)
 
@@ -91,14 +92,15 @@ class Motors:
         return self._right_line, self._left_line
 
     def _spin_speed(self, rate_radps: float) -> float:
-        """Return the speed of each wheel in a turn on the spot at this rate, in nominal units."""
+        """Return the speed of each wheel in a turn on the spot at ``rate_radps``, in nominal
+        units."""
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
         """Return the ratio of the motors' speeds (left / right) if each motor has ``units``.
 
-        The ratio is limited to ``motor_balance`` ± MOST_UNEQUAL, because a ``MotorLine`` can be
-        wrong. The reason: the network may have lost or duplicated a request to change the speed.
+        A ``MotorLine`` can be wrong, because the network may have lost or duplicated a request to
+        change the speed. Therefore, the ratio is limited to ``motor_balance`` ± MOST_UNEQUAL.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
@@ -117,7 +119,7 @@ class Motors:
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
         """Return the speeds of the right and the left wheel, in m/s, not negative.
 
-        In a tight turn the inner wheel stands still.
+        If a turn is so tight that the inner wheel would have to turn backward, its speed is 0.
         """
         half = rate_radps * self._settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
@@ -128,9 +130,10 @@ def _units(lines: Lines, speed: float) -> int:
 
 
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
-    """Learn from ``speed``, the mean speed of both motors in a turn on the spot with ``units``.
+    """Learn from a turn on the spot in which both motors had ``units``.
 
-    The turn does not show the speed of each motor, so both motor lines change by the same amounts.
+    ``speed``: the mean of both motors' speeds. It does not show the speed of each motor, so both
+    motor lines change by the same amounts.
     """
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2
@@ -140,5 +143,5 @@ def _learn_spin(lines: Lines, units: int, speed: float) -> None:
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:
-    """Return the units that an ideal motor needs at 1 V for one encoder count per second."""
+    """Return the units that an ideal motor needs at 1 V to turn by one encoder count per second."""
     return abs(settings.metres_per_count) * settings.nominal_volts / settings.speed_per_unit

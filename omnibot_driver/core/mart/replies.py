@@ -40,7 +40,7 @@ class Ok:
 
     @property
     def file(self) -> tuple[str, int]:
-        """The file name and its size in bytes in a reply of form FILE."""
+        """The name of a file, and the size of this file in bytes, from a reply of form FILE."""
         name, _, size = self.text.rpartition(" ")
         return name, int(size)
 
@@ -68,9 +68,9 @@ Reply = Ok | Fail | Other
 class MartDecoder:
     """The decoder of replies.
 
-    ``foreign``: number of datagrams so far that are not replies.
+    ``foreign``: number of received datagrams that are not replies.
 
-    Each datagram is complete, so the decoder keeps no data between calls.
+    A reply is always one complete datagram, so the decoder keeps no data between calls.
     """
 
     def __init__(self) -> None:
@@ -105,8 +105,8 @@ def parse(data: bytes) -> Reply:
 
 
 def signed(count: int) -> int:
-    """Return the count as a signed 32-bit number.
+    """Return ``count`` as a signed 32-bit number.
 
-    Some servers omit the sign of a negative count and send an unsigned number instead.
+    Some servers send a negative count as an unsigned number, without the sign.
     """
     return (count + 2**31) % 2**32 - 2**31

@@ -16,32 +16,36 @@ from omnibot_driver.core.mart.motors import MOST_UNITS, UNEQUAL, Motors
 from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_CHANGE: Final = 15
-"""Largest allowed change in units by one command.
+"""Largest change of a motor's units that one command may request.
 
-It is small, because the network may duplicate a command, which then acts twice.
+The limit is small, because the network may duplicate a command. The server then changes the units
+twice.
 """
 MOST_BACKWARD: Final = 5
 """Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-A slow network may deliver a command twice. In a backward drive, the driver does not notice this.
+A slow network may deliver a command twice, so that the units change twice. The driver does not
+notice this while the robot drives backward.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
 
-``SETTLE_S``: time after a large change of units in which the driver does not learn.
+``SETTLE_S``: time for which the driver does not learn after a large change of the motors' units.
 
-``LEARN_S``: shortest averaging window.
+``LEARN_S``: shortest duration of the averaging window.
 """
 LARGE_UNITS: Final = 3
 MOST_MISSED: Final = 4
 """Largest number of unanswered changes of the units that the driver examines together.
 
-From the measured speeds, the driver finds out which of these changes have arrived at the server.
+A change that the server did not answer may have been lost. The driver finds out from the measured
+speeds which changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""How slow exchanges with the server change what the driver learns about the motors.
+"""How the driver learns about the motors if exchanges with the server are slow.
 
-``LEARN_TRIPS``: the averaging window is LEARN_S, plus the duration of this number of exchanges.
+``LEARN_TRIPS``: number of exchanges. The averaging window lasts LEARN_S, plus the duration of this
+number of exchanges.
 
 ``LESS_PER_S``: relative growth of a measured speed's standard deviation, for each second that an
 exchange takes.
@@ -49,29 +53,31 @@ exchange takes.
 SLOWEST_MPS: Final = 0.015
 """Measured wheel speed in m/s above which a wheel is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
-"""Least wheel speed in m/s at the start of RM (forward).
+"""Lowest wheel speed in m/s with which the driver starts RM (forward).
 
 At a lower speed, the server might not notice the motion.
 """
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
-"""Factor by which the units of the next RM (forward) grow after a start that turned no motor.
+"""Factor by which the driver raises the units of the next RM (forward) if no motor has turned.
 
-These larger units are at most MOST_DEAD. If the commanded speed needs more than MOST_DEAD, RM uses
-what the speed needs.
+The raised units are at most MOST_DEAD. If the commanded speed needs more units than MOST_DEAD, the
+driver uses the units that the speed needs.
 """
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""Time in s after a new commanded turn rate for which the heading error is not integrated."""
+"""Time in s after a change of the commanded turn rate. During this time, the driver does not
+integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units.
 
 The variance grows by one of these factors, times the square of the relative change.
 
-``COPIED``: if the change may arrive twice, because queries take longer than ``SLOW_TRIP_S`` (s).
+``COPIED``: the factor if the change may arrive twice. This is possible if queries take longer than
+``SLOW_TRIP_S`` (s).
 
-``MISSED``: if the change was not answered.
+``MISSED``: the factor if the server did not answer the change.
 
 Both factors are large, because a wrong ratio lasts for the whole motion.
 """
@@ -81,11 +87,11 @@ Both factors are large, because a wrong ratio lasts for the whole motion.
 class _Side:
     """One motor, and the wheel that it turns.
 
-    ``stood_s``: time in s for which the wheel has not turned, although the motor has enough units
-    to turn it.
+    ``stood_s``: for how long the wheel has not turned, in s, although the motor has enough units to
+    turn it.
 
-    ``window_units_s``, ``window_m``: sum of units * seconds, and distance in m, in the averaging
-    window.
+    ``window_units_s``: sum of units * seconds in the averaging window. ``window_m``: distance in m
+    in the averaging window.
     """
 
     line: MotorLine
@@ -102,10 +108,10 @@ class _Side:
 class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
-    ``trip_s``: average duration of an exchange, in s.
+    ``trip_s``: average duration of an exchange with the server, in s.
 
-    ``part``: how much the last change changed the motors' units: the sum of one ratio per motor.
-    The ratio is the amount of the change, divided by the motor's units before it.
+    ``part``: relative size of the last change of the motors' units. It is the sum of two ratios,
+    one for each motor: the amount of the change, divided by the motor's units before the change.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -130,10 +136,10 @@ class SpeedLoop(Motors):
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
-        """Return the units with which RM (forward) starts both motors, at most 60.
+        """Return the units with which RM (forward) starts both motors.
 
-        The slower wheel's speed needs this number of units. If an earlier start turned no motor,
-        the number is larger.
+        This is the number of units that the slower wheel needs for its speed, but at most 60. If an
+        earlier start turned no motor, the number can be larger.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -149,7 +155,8 @@ class SpeedLoop(Motors):
 
         ``units``: the units that both motors have; None for the current units of each motor.
 
-        A motor with MOST_DEAD units or more is regarded as blocked: nothing is learned.
+        A motor with MOST_DEAD units or more is regarded as blocked, so the driver learns nothing
+        from it.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -165,9 +172,9 @@ class SpeedLoop(Motors):
 
     @property
     def blocked_s(self) -> float:
-        """Time in s for which a wheel has not turned although its motor has enough units.
+        """Time in s for which a wheel has not turned, although its motor has enough units.
 
-        If both wheels have not turned, the result is the longer one of their times.
+        If neither wheel has turned, the result is the longer one of the two wheels' times.
         """
         return max(self._right.stood_s, self._left.stood_s)
 
@@ -175,8 +182,8 @@ class SpeedLoop(Motors):
     def left_over_right(self) -> float:
         """Expected ratio of left to right wheel speed.
 
-        It is computed from the current units, and from the two motor lines that the driver has
-        learned. If both sides have equal units, the ratio is ``balance``.
+        It is computed from the current units of both motors, and from the two motor lines that the
+        driver has learned. If both motors have equal units, the ratio is ``balance``.
         """
         right, left = self._right, self._left
         if not right.units:
@@ -186,7 +193,7 @@ class SpeedLoop(Motors):
 
     @property
     def balance(self) -> float:
-        """Ratio of left to right motor speed if both motors have the same units, ``units``.
+        """Expected ratio of left to right motor speed if both motors have ``units``.
 
         The ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
         """
@@ -194,9 +201,9 @@ class SpeedLoop(Motors):
 
     @property
     def measured_balance(self) -> float | None:
-        """Measured ratio of left to right motor speed at equal units of both motors.
+        """Measured ratio of left to right motor speed if both motors have the same units.
 
-        The ratio is not limited. None before a measurement.
+        It is None until the ratio has been measured. Unlike ``balance``, the ratio is not limited.
         """
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
@@ -214,10 +221,10 @@ class SpeedLoop(Motors):
         *,
         right_only: bool = False,
     ) -> None:
-        """Learn from a displacement measured over ``seconds``, and update the heading error.
+        """Learn from a displacement measured over ``seconds``. Update the heading error, too.
 
-        ``right_only``: whether only the right wheel was measured. In this case, the left motor's
-        line changes by the same amounts as the right motor's line.
+        ``right_only``: whether only the right wheel was measured. In this case, the left
+        ``MotorLine`` changes by the same amounts as the right ``MotorLine``.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
@@ -245,11 +252,11 @@ class SpeedLoop(Motors):
             self._clear(now)
 
     def _judge_missed(self, *, right_only: bool) -> None:
-        """Undo the unanswered changes of the units that have not arrived at the server.
+        """Undo the unanswered changes of the units that have probably not arrived at the server.
 
-        The server has answered none of the changes in ``_missed``, so each may have arrived or not.
-        The driver tries all combinations of arrived and lost changes. It assumes the combination
-        whose units fit the measured speeds best.
+        The server has not answered the changes in ``_missed``, so it is unknown which of them have
+        arrived. The driver tries all combinations of arrived and lost changes. It assumes the
+        combination whose units fit the measured speeds best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:

@@ -53,8 +53,8 @@ class MeasurementPipeline:
             settings.motion, period_s or 0.0, corrected=board.traits.own_odometry
         )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
-        """Reads that are not counted yet: the readings of each read, and the age in s of the newest
-        of these readings when it arrived."""
+        """Reads whose readings are not counted yet. Each is a pair: the readings of the read, and
+        the age in s that the newest of these readings had on arrival."""
         self.undigested: list[Stamped] = []
         """Stamped readings that wait for ``flush``."""
 
@@ -66,7 +66,7 @@ class MeasurementPipeline:
 
     @property
     def refused(self) -> Refused:
-        """Numbers of readings rejected as implausible."""
+        """Numbers of IMU readings, displacements and poses that were rejected as implausible."""
         checked = self._outliers
         return Refused(
             checked.refused_imu, checked.refused_displacements, self.odometry.refused_poses
@@ -89,8 +89,8 @@ class MeasurementPipeline:
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
         """Process readings that arrived at ``now``; return the IMU estimates that result from them.
 
-        Readings that are not from the IMU wait for ``flush``. IMU readings that come after a
-        waiting reading also wait.
+        Readings that are not from the IMU wait for ``flush``. While such a reading waits, IMU
+        readings that come after it wait too.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

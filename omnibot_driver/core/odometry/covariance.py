@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The uncertainty of the odometry, from three sources of error that are stored separately.
+"""The uncertainty of the odometry. Its three sources of error are stored separately.
 
-The sources are the wheels, unreported motion in gaps, and corrections still due.
-docs/internals/architecture.md explains when the error of each source shrinks.
+The sources are the wheels, motion in gaps that the board did not report, and corrections that are
+still due. docs/internals/architecture.md explains when the error of each source shrinks.
 
 This module knows covariances and the wheels' geometry; it does not know frames or boards.
 """
@@ -118,11 +118,11 @@ class Uncertainty:
         self.gap = NOTHING
         self._walk = Covariance()
         self._levers: list[tuple[float, float, float]] = []
-        """For each wheel: the error of the pose (m, m, rad) that a relative size error of 1 would
-        cause."""
+        """For each wheel: the error of the pose (m, m, rad) if the relative error of the wheel's
+        size is 1."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
-        """Move the body along a tangent (twist x time), and add the errors of its wheels.
+        """Move the body along a tangent (twist x time), and add the errors of the wheels.
 
         ``heading_rad``: heading before the move. The code uses plain numbers, because Pose objects
         are slow.
@@ -158,9 +158,9 @@ class Uncertainty:
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
-        The uncertainty is the deviation from a motion at constant speed. If the robot accelerates
-        and then brakes in time t with acceleration a, this deviation is at most a·t²/4. The fastest
-        speeds also limit the deviation.
+        The uncertainty is the possible deviation from a motion at constant speed. Within the time
+        t, the robot may accelerate with the acceleration a and then brake. It then deviates by at
+        most a·t²/4. The deviation is also limited by the fastest speeds.
         """
         square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(
@@ -177,7 +177,10 @@ class Uncertainty:
         self._walk, self.gap = self._walk + self.gap, NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
-        """Return the covariance of a pose that still has the known error ``open_error``."""
+        """Return the covariance of a pose.
+
+        ``open_error``: the part of the pose's error that is known, but not corrected yet.
+        """
         noise, levers = self.noise, self._levers
         scale = noise.wheel_scale * noise.wheel_scale
         slip = noise.wheel_slip * noise.wheel_slip
@@ -191,7 +194,8 @@ class Uncertainty:
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """Return, for each wheel, the motion of the body when only this wheel rolls, by one metre."""
+    """Return, for each wheel, the motion of the body if this wheel rolls by 1 m, and no other
+    rolls."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(
