@@ -88,12 +88,14 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int], drop: bool) -> None:
-    """Write the stop command ``last_words`` to its lines 20 times.
+    """Write the packets of the stop command ``last_words`` to their lines, 20 times.
 
-    End earlier if all lines are lost, or if a descriptor in ``until`` has input. Such input comes
-    from the driver. It shows that the driver runs again, and can stop the robot itself.
+    ``until``: descriptors on which the driver sends. Input on one of them shows that the driver
+    runs again, and can stop the robot itself. So the function ends early if there is input. It also
+    ends early if all lines are lost.
 
-    ``drop``: whether to discard first what the driver has written and the lines have not sent yet.
+    ``drop``: whether to discard, at the beginning, the driver's output that the lines have not sent
+    yet.
     """
     lines = {line for line, _ in last_words}
     for line in lines if drop else ():
@@ -115,7 +117,8 @@ def speak(last_words: Words, until: list[int], drop: bool) -> None:
 def drop_what_waits(line: int) -> None:
     """Discard the output that the line has not sent yet.
 
-    Otherwise the stop would have to wait until earlier motion commands are sent.
+    This output may contain motion commands. The line would send them before the guard's stop
+    command.
     """
     # contextlib would take a tenth of the guard's memory
     try:  # noqa: SIM105

@@ -101,10 +101,11 @@ UNLIKE_THE_ROW = {"mart": {"speed_per_unit"}, "fejemis": {"wheelbase_m"}}
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_the_settings_have_the_defaults_of_the_parameters(board: str) -> None:
-    """The defaults of a board's settings are those of the parameters.
+    """The defaults of a board's settings are the same as the defaults of its parameters.
 
-    The test makes settings from the parameters' defaults. So it also fails if ``settings`` leaves a
-    field out, or exchanges two fields.
+    The test makes settings from the parameters' defaults, and compares them with the settings' own
+    defaults. So it also fails if the function ``settings`` leaves a field out, or exchanges two
+    fields.
     """
     settings = boards.load(board).settings(boards.check_all({"board": board}))
     defaults = type(settings)()

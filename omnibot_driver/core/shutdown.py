@@ -69,7 +69,7 @@ class Shutdown:
         return packets + self._estop_again()
 
     def broken_off(self) -> Packets:
-        """Return the packets to write before the port is closed, if a write failed half-way.
+        """Return the packets to write before the port is closed, if the last write was incomplete.
 
         These packets wake the board. If the e-stop is latched, they also repeat the emergency stop.
         """

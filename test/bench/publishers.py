@@ -14,7 +14,8 @@ from rclpy.node import Node
 def connected(namespaces: Sequence[str]) -> list[Any]:
     """Initialize ROS, and return one publisher per namespace.
 
-    Before it returns, the function waits until each publisher has a subscriber, and then for 1 s.
+    Before it returns, the function waits until each publisher has a subscriber. Then it waits for
+    one more second.
     """
     rclpy.init()
     node = Node("hand", start_parameter_services=False, enable_rosout=False)

@@ -98,10 +98,10 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Frames are lost, and the odometry is reset before the board's next pose arrives.
+    """Motion before a reset of the odometry does not appear in odom after the reset.
 
-    This pose shows the lost motion. Odom does not contain this motion, because it happened before
-    the reset.
+    Frames are lost. Then the odometry is reset, before the board's next pose arrives. This pose
+    shows the motion of the lost frames, which happened before the reset.
     """
     for seed in range(4):
         on = line(seed)

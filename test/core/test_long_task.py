@@ -55,9 +55,10 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task runs while the robot is at rest. The robot never drove, so it was not stopped.
+    """A task ends when a driven robot is stopped, but not if the robot was at rest all the time.
 
-    Therefore the task continues. Then the robot is driven and stopped, which ends the task.
+    First, a task runs while the robot is at rest, and continues. Then the robot is driven and
+    stopped, which ends the task.
     """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)

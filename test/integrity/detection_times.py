@@ -67,8 +67,8 @@ def row(
 ) -> None:
     """Print a row of the table: the shortest and the longest reaction time.
 
-    The function measures one reaction time for each tick of the period between two displacements.
-    The motion begins at this tick.
+    The motion may begin at any tick between two displacements. For each of these ticks, the
+    function measures one reaction time.
     """
     shown = []
     for period_s in PERIODS_S:

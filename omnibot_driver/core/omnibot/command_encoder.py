@@ -101,10 +101,10 @@ class CommandEncoder:
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist that is commanded by the last command frame in ``packets``.
+        """Return the twist that the last command frame in ``packets`` commands.
 
-        The result is zero for Stop, the emergency stop and data without a command frame. For a
-        goal, the result has no meaning.
+        For Stop, the emergency stop, and data without a command frame, the result is zero. If the
+        last command frame is a goal, the result has no meaning.
         """
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])

@@ -3,8 +3,9 @@
 """The order in which a running board sends frames, and an estimate of the frames that were lost.
 
 At 25 Hz, the board sends a delta after every fourth IMU frame, and a pose after every fifth delta.
-Discarded bytes are assumed to be the next frames in this order, so their number shows which frames
-were lost. This is only an estimate; the counters in the frames and the arrival times correct it.
+If bytes were discarded, the driver assumes that they were the next frames in this order. So the
+number of discarded bytes shows which frames were lost. This is only an estimate, which the counters
+in the frames and the arrival times correct.
 """
 
 from functools import cache
@@ -62,8 +63,8 @@ class FrameSchedule:
 
         ``skipped``: number of discarded bytes before the frame.
 
-        For a pose, the result is always 0. IMU frames that were lost before a pose are counted in
-        the result for the next frame of another kind.
+        For a pose, the result is always 0. IMU frames that were lost before a pose are counted
+        later, in the result for the next frame that is not a pose.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

@@ -31,18 +31,18 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
 
-The deltas are added up in each of the two frames. The error of a sum is its distance from the
-board's pose. The pose contradicts the configured frame if the error in this frame is above
-``CLEARLY_M``, and also above ``TIMES`` times the error in the other frame.
+The check adds up the deltas twice, once in each frame. The error of each sum is its distance from
+the board's pose. The configured frame is wrong if two conditions are true: its error is above
+``CLEARLY_M``, and its error is above ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Limits for the advice to change the setting of the period of the deltas.
+"""Limits for the advice to change the configured period of the deltas.
 
-The advice is given if the deltas show another period than the setting. ``FEWEST_DELTAS``: number of
+The driver gives the advice if the deltas show another period. ``FEWEST_DELTAS``: number of
 consecutive deltas that must show the same other period. ``FOR_S``: time in s for which the deltas
-must show this period.
+must show this other period.
 """
 RATE_TOLERANCE: Final = 0.1
 
@@ -67,9 +67,9 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Store a delta, to compare the sum of deltas with the next pose (setting ``delta_frame``).
+        """Store a delta for the check of ``delta_frame``, which compares deltas with a pose.
 
-        ``reading``: the delta as the settings interpret it.
+        ``reading``: the delta, interpreted with the present settings.
         """
         self._moved.append(reading)
         unbroken = not (reading.lost or reading.restarted or reading.duration_s is None)

@@ -35,27 +35,28 @@ from omnibot_driver.core.readings import (
 DELTA_LSB: Final = 1e-4
 """Size of one count of a delta: 0.1 mm in m, or 0.1 mrad in rad."""
 MOST_TEXTS_LOST: Final = 9
-"""Largest number of "Paused" texts that may have been lost, according to the counter in the texts.
+"""Largest number of "Paused" texts that can have been lost since the last received one.
 
-The board sends one text a second, and answers a reset within 9 s. So if the counter seems to show
-that more texts were lost, the board has restarted.
+The counter in the texts shows how many were lost. The board sends one text a second, and answers a
+reset within 9 s. So if the counter seems to show a larger number, the board has restarted.
 """
 FULL: Final = 4000
-"""Number of bytes from which on the kernel's buffer of 4 KiB is regarded as full before a read.
+"""Number of bytes in a read from which on the kernel's buffer of 4 KiB counts as full.
 
-The bytes are those that are decoded after one read. The number is below 4096, because the decoder
-may keep some bytes of a read for later.
+Only the bytes that are decoded after the read are counted. The decoder may keep some bytes of a
+read for later, so the number is below 4096.
 """
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The next read is regarded as late if the board needed more time to send its bytes than ``BURST_S``
-plus twice the time between the two reads.
+The check compares two times: the time that the board needed to send the bytes of the next read, and
+the time between the two reads. The next read is late if the first time is longer than ``BURST_S``
+plus twice the second time.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
 """Shortest delay of a read, in s, for which the driver corrects arrival times. A shorter delay may
-only seem to be there, because the board's clock is inaccurate."""
+not be real, because the board's clock is inaccurate."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
@@ -77,7 +78,10 @@ class Translation:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection, and keep only the board's counters and the checks of settings."""
+        """Begin a new connection.
+
+        From the last connection, keep only the board's counters and the checks of the settings.
+        """
         self.modes = ModeTracker(self._schedule)
         self._rhythm = FrameSchedule(self._schedule)
         self._sequence.reconnect()
@@ -117,11 +121,12 @@ class Translation:
     def _sent_s(self, count: int, now: float) -> float:
         """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
-        If the read was not late, return ``now``. While the driver was late, the kernel's buffer may
-        have become full. A full buffer keeps its bytes and loses all bytes that come later. So
-        there is no gap within the bytes in the buffer: the board sent the bytes of this read
-        directly after the bytes of the previous read. This is also true if the driver needs several
-        reads to empty the buffer.
+        If the read was not late, the result is ``now``.
+
+        While the driver was late, the kernel's buffer may have become full. A full buffer keeps its
+        bytes, and loses all bytes that arrive later. So no byte is missing between the bytes in the
+        buffer: the board sent the bytes of this read directly after those of the previous read. The
+        same is true if the driver needs several reads to empty the buffer.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S
@@ -134,7 +139,8 @@ class Translation:
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Update mode, schedule and IMU count by the IMU frames that ``single_imu`` decoded."""
+        """Record the IMU frames that ``single_imu`` decoded: update mode, schedule and IMU
+        count."""
         singles = self._most_singles - self.singles_to_come
         self.singles_to_come = self._most_singles = 0
         if singles:

@@ -18,7 +18,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time, in increasing order.
 
-    A stamp is later than the arrival only if the previous read came at almost the same time.
+    If the previous read came at almost the same time, a stamp is later than the arrival time.
     """
 
     skew_ppm = 0.0

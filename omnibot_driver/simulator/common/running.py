@@ -61,7 +61,7 @@ class RunningBoard(ABC, Generic[B]):
 
     @property
     def facts(self) -> dict[str, object]:
-        """``board.facts``, the number of dropped bytes, and the number of each fault of the lines.
+        """``board.facts``, the number of dropped bytes, and the number of faults of each kind.
 
         The caller must hold ``lock``.
         """

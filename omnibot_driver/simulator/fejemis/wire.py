@@ -45,9 +45,10 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Check a line; return the result, the line without ``;NN``, and its correct checksum.
+    """Check the checksum of a line.
 
-    If the line has no ``;NN``, the third value is 0.
+    Return three values: the result of the check, the line without ``;NN``, and the checksum that
+    the line should have. If the line has no ``;NN``, the third value is 0.
     """
     found = _PREFIX.match(text)
     if found is None:
@@ -74,7 +75,7 @@ def padded(text: str, count: int) -> list[float]:
 class LineReader:
     """Splits characters into lines.
 
-    If the buffer is full, the next character replaces all characters in it.
+    If a line fills the buffer, the next character replaces all characters in the buffer.
     """
 
     def __init__(self) -> None:

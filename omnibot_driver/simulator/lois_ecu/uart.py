@@ -58,7 +58,7 @@ class Uart:
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
-        """Lose a character in the next ``listen``: an interrupt blocks the port for 0.2 ms."""
+        """Make the next ``listen`` lose a character, as an interrupt of 0.2 ms would do."""
         self._misses = True
 
     def listen(self) -> int:

@@ -88,8 +88,8 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks of the public source code. They equal ``FIRMWARE``, except where the code contradicts what
-was observed on the running server."""
+"""Quirks that are in the public source code. They are those of ``FIRMWARE``, except where the
+source code contradicts the behaviour of the running server."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {

@@ -79,10 +79,11 @@ def _record(
 def _to_and_fro(
     levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
 ) -> tuple[Law, float]:
-    """Return a control law that alternates between slow and fast speed, and its duration in s.
+    """Return a control law for a wheel, and the duration of this law in s.
 
-    Each step begins at a different phase of the period of the odometry deltas. So the deltas of all
-    steps together show the whole response.
+    The wheel alternates between the slow and the fast speed. Each step from one speed to the other
+    begins at a different phase of the period of the odometry deltas. So the deltas of all steps
+    together show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

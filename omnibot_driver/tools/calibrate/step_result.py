@@ -18,10 +18,10 @@ QUANTUM_RADPS: Final = 0.05
 The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 """
 MANY: Final = 1.5
-"""Ratio of the residuals to the quantisation error above which the tool warns.
+"""Limit for the ratio of the residuals to the quantisation error. Above it, the tool warns.
 
-A possible cause of large residuals is that commands were delayed. Delayed commands make the
-residuals twice as large. They also make the delay that the tool finds for the wheel 4 ms too long.
+Large residuals may mean that commands were delayed. Delayed commands have two effects: the
+residuals are twice as large, and the delay that the tool finds for the wheel is 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.
@@ -31,9 +31,9 @@ Above this ratio, the tool regards the motor model as wrong.
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Find better gains, one set for all wheels, and return the result.
+    """Find better gains, and return the result. The gains are the same for all wheels.
 
-    ``now``: the gains in the firmware, which has only one set.
+    ``now``: the gains in the firmware, which also has one set of gains for all wheels.
     """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)

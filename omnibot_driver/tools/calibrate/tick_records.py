@@ -25,9 +25,9 @@ UNLIKE: Final = 1.5
 A larger factor shows that the board missed an edge of the encoder's signal or noticed it late.
 """
 SMOOTHED: Final = 4
-"""Number of successive times between ticks from whose sum one speed is computed.
+"""Number of successive times between ticks that are added up to compute one speed.
 
-If a mark of the encoder is displaced, the sum changes only if it begins or ends at this mark.
+If one mark of the encoder is displaced, only the sums that begin or end at this mark are wrong.
 """
 
 

@@ -36,11 +36,11 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the possible roles of this topic, according to its name.
+    """Return the roles that this topic may have, according to its name.
 
     The key is the role. The value is a pair: the robot's namespace, and whether the topic fits the
-    role. It fits if ``kind`` is a message type of the role. For a role such as ``state``, a node in
-    ``drivers`` must also have this topic in its own namespace.
+    role. The topic fits if ``kind`` is a message type of the role. For a role such as ``state``, a
+    second condition applies: a node in ``drivers`` must have this topic in its own namespace.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

@@ -90,9 +90,9 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
 
 @given(any_twists)
 def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
-    """The limits do not change a twist that ``allow`` accepts.
+    """If ``allow`` accepts a twist, the limits do not change it.
 
-    A twist that ``allow`` does not accept exceeds a limit.
+    If ``allow`` does not accept a twist, the twist exceeds a limit.
     """
     limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
     if limits.allow(twist):

@@ -83,9 +83,10 @@ def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """The line ``confs`` contains track width and wheelbase, in either order.
+    """The line ``confs`` contains track width and wheelbase, but their order is not known.
 
-    The driver finds the order, because the line ``conf`` contains the track width too.
+    The line ``conf`` contains the track width too. By comparing both lines, the driver finds the
+    order.
     """
     for turned in (False, True):
         configuration = Configuration("drive", {})
@@ -278,10 +279,10 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """A text line that writes a setting is lost. Motion is refused until the board has the setting.
+    """Motion is refused until the board has all settings that the user has set.
 
-    The driver does not repeat this line while the robot is driven. So without the refusal, the
-    board could drive without the setting.
+    A text line that writes a setting is lost. While the robot is driven, the driver does not repeat
+    this line. So if motion were not refused, the robot could be driven without the setting.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

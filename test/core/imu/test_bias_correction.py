@@ -243,9 +243,9 @@ def test_the_figures_count_what_happened() -> None:
 
 
 def test_a_calibration_ends_when_the_estop_is_latched() -> None:
-    """Somebody latches the e-stop during a calibration. This calibration fails.
+    """If the e-stop is latched during a calibration, the calibration fails.
 
-    A new calibration is called while the e-stop is still latched. It succeeds.
+    Then the user calls another calibration, while the e-stop is still latched. This one succeeds.
     """
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)

@@ -62,11 +62,11 @@ def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: f
 def test_a_restart_shows_although_the_clock_wraps_at_that_time(
     wrapped_for_s: float, speed_mps: float
 ) -> None:
-    """The board restarts shortly after its clock wrapped, or shortly before it would wrap.
+    """The driver notices a restart, although the board's clock wraps at about the same time.
 
-    After the restart, the clock begins at zero. Without the restart, the clock would be near zero
-    too. The driver still notices the restart. So the odometry does not take the lost tick counts
-    for a motion backward.
+    After the restart, the clock begins at zero. Without the restart, it would be near zero too, so
+    the clock alone does not show the restart. The board has also lost its tick counts. The odometry
+    does not take their loss for a motion backward.
     """
     bench = Bench("documented")
     begin_drive(bench, speed_mps, 2.4, wrapped_for_s)
@@ -119,9 +119,10 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
-    """The robot drives forward, and then backward until its tick counts are about zero.
+    """The driver does not take wheels that roll back for a restart of the board.
 
-    At this moment, the board's clock wraps. So clock and counts look as after a restart. In the
+    The robot drives forward, and then backward until its tick counts are about zero. At this
+    moment, the board's clock wraps. So clock and counts are the same as after a restart. In the
     second case of the test, a read is also late, so the clock does not fit the arrival times. In
     both cases, the driver assumes no restart.
     """

@@ -86,11 +86,10 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The server rejects one forward drive (RM), and obeys the next RM. The driver ends this drive.
+    """The robot moves without a command, some time after a rejected forward drive (RM).
 
-    Later, the robot moves without a command. If the robot moves after a rejected RM, the server may
-    be defective. But here the server has obeyed an RM since then, so the driver still allows
-    motion.
+    If the server rejects RM and the robot then moves, the server may be defective. But here the
+    server has obeyed another RM in between. Therefore, the driver still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -252,8 +251,8 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
     """The server rejects a forward drive (RM). Five seconds later, a person pushes the robot.
 
-    A defective server rejects RM, and moves the robot immediately. This motion comes much later, so
-    the driver still allows motion.
+    The driver does not regard the server as defective. A defective server would reject RM, and move
+    the robot at once. Here the robot moves much later, so the driver still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -269,10 +268,10 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """The server rejects a forward drive (RM). Later, a copy of RM arrives and moves the robot.
+    """A rejected forward drive (RM) moves the robot later, because a copy of RM arrives late.
 
-    At this time, the network loses replies. The driver stops the robot, but does not regard the
-    server as defective. So it does not refuse motion permanently.
+    At this time, the network also loses replies. The driver stops the robot. It does not regard the
+    server as defective, so it does not refuse motion permanently.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

@@ -18,8 +18,8 @@ from omnibot_driver.simulator.mart import Firmware
 HEAVY_S = 0.2
 """Time constant in s of the motors of a heavy robot.
 
-After a stop, the server waits for a limited time until the wheels are at rest. The wheels of this
-robot turn for longer.
+After a stop, the server waits for the wheels to come to rest, but only for a limited time. The
+wheels of this robot turn for longer than this time.
 """
 
 
@@ -104,9 +104,9 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """A motor is stuck, so the turn towards a goal does not begin. The driver discards the goal.
 
-    The server reports the failure "start timedout". The driver must not discard the goal whenever
-    it gets this failure. If a heavy robot still moves some time after a turn, the server reports
-    the same failure, and the driver continues to the goal.
+    The server reports the failure "start timedout". This failure alone is no reason to discard a
+    goal: the server also reports it if a heavy robot still moves some time after a turn. In that
+    case, the driver continues to the goal.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -117,11 +117,11 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 
 @pytest.mark.slow
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
-    """An obstacle ends a move of a heavy robot early. The server reports only a slow stop.
+    """An obstacle ends a move early. The driver does not make a later move longer.
 
-    The reply to the next move shows the driver that there was an obstacle. The distance of the
-    first move was too short because of the obstacle, so the driver learns nothing from it. For a
-    later goal, the driver therefore requests the usual distance, not a longer one.
+    The robot is heavy, so the server reports only a slow stop. The reply to the next move shows the
+    driver that there was an obstacle. The first move was too short because of the obstacle, so the
+    driver learns nothing from its distance. For a later goal, it requests the usual distance.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -181,10 +181,10 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
 
 
 def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
-    """Replies count against a silence, even if they contain no measurement.
+    """Every reply shows that the server is not silent, even a reply without a measurement.
 
-    The last reply before a gap in the network is the server's name. The driver counts the silence
-    from this reply on.
+    The last reply before a gap in the network contains only the server's name. The driver measures
+    the silence from this reply.
     """
     bench = MartBench().ready()
     bench.speaks = False

@@ -12,9 +12,9 @@ PAGE = Path(__file__).parents[3] / "docs/boards/mart.md"
 
 
 def test_every_command_has_its_row() -> None:
-    """The page has a row for every command. It marks commands that the driver never sends.
+    """The page has a row for every command, and marks the commands that the driver never sends.
 
-    These are the commands in ``NEVER_SAID``, and TD.
+    The marked commands are those in ``NEVER_SAID``, and TD.
     """
     section = PAGE.read_text(encoding="utf-8").split("## Every command")[1].split("\n## ")[0]
     rows = re.findall(r"^\| ([A-Z][A-Z ,]*) \| (.+) \|$", section, re.MULTILINE)

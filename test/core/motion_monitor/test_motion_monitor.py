@@ -205,8 +205,8 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
     """A commanded robot does not move. The monitor returns a fault each second.
 
-    The caller must filter the repetitions. After a release of the e-stop, the monitor returns
-    another fault: the board may still hold the e-stop.
+    The caller must filter out the repetitions. If the e-stop was released before, the monitor
+    returns a different fault, because the board may still hold its e-stop.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -218,10 +218,10 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot that should drive at 0.4 m/s is held for 1 s, so it falls 0.4 m behind.
+    """A robot that was held may drive too fast, until it has made up for the lost distance.
 
-    When it is released, it may be too fast until it has made up for this distance. After that, too
-    high a speed is a fault.
+    The robot should drive at 0.4 m/s. It is held for 1 s, so it falls 0.4 m behind. After it has
+    made up for this distance, too high a speed is a fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
@@ -247,8 +247,8 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
     """A robot that has obeyed Stop is pushed for a long time.
 
-    The monitor reports a fault again and again. Each fault makes the driver send Stop. The
-    intervals between the faults grow.
+    The monitor reports a fault repeatedly, and the driver sends Stop for each fault. The time from
+    one fault to the next becomes longer each time.
     """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
@@ -258,8 +258,8 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
     """A driven robot drives on, because it has not received Stop.
 
-    If Stop is repeated, it may arrive. Therefore, the monitor reports a fault every 5 s, and each
-    fault makes the driver send Stop again. The intervals between the faults do not grow.
+    If Stop is repeated, it may arrive. Therefore, the monitor reports a fault every 5 s, and the
+    driver sends Stop for each fault. The time from one fault to the next does not become longer.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)

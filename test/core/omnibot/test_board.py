@@ -107,10 +107,11 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A «Paused» text continues the «Paused» text that came directly before it.
+    """A «Paused» text continues the text before it only if nothing came between the two texts.
 
-    It continues the earlier text only if the board sent no data between the two, and at most nine
-    texts were lost. Otherwise the board may have run or restarted between the two texts.
+    Two conditions must be true: the board sent no other data between the two texts, and at most
+    nine «Paused» texts were lost between them. Otherwise the board may have run or restarted in
+    between.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]
@@ -233,9 +234,9 @@ def test_waking_is_eight_zeros_and_stop() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
-    """To start the board in any mode, the driver sends S, which is harmless in every mode.
+    """To start the board, the driver sends S. It may do so in every mode, because S is harmless.
 
-    Sending S does not change the mode that the driver assumes. Only received data does.
+    When the driver sends S, it does not assume a new mode. It does so only when it receives data.
     """
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"

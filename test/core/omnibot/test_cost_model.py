@@ -45,9 +45,10 @@ def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
 
 
 def test_a_pose_after_a_lost_delta_contradicts_nothing() -> None:
-    """A delta is lost before a pose, so it is unknown how far the robot has turned.
+    """After a lost delta, no heading of the next pose contradicts the deltas.
 
-    No heading of the pose can contradict the deltas, so all headings have the same cost.
+    It is unknown how far the robot turned in the lost delta. Therefore, all headings of the next
+    pose have the same cost.
     """
     context = after_a_cycle([10] * 5, [10, 11, 13, 14, 15])
     near, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 105.0, 2), context)

@@ -138,10 +138,11 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """Each delta is rounded by up to 0.05 mrad in the same direction, so the errors add up.
+    """A pose does not contradict deltas that were all rounded in the same direction.
 
-    If the next pose differs from the deltas by this sum, the pose has no cost: it contradicts
-    nothing. If it differs by more than twice this sum, it has a cost.
+    Each delta is rounded by up to 0.05 mrad, so the rounding errors add up. If the next pose
+    differs from the deltas by the sum of these errors, the pose has no cost. If it differs by more
+    than twice this sum, the pose has a cost.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose

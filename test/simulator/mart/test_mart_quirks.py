@@ -25,10 +25,10 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether the server regards a drive (F) as in progress after it was stopped by SL.
+    """Return whether a drive (F) counts as in progress after SL has stopped it.
 
-    SL is a stop on the stop port. If the drive counts as in progress, the server refuses other
-    motions. The usual stop (SM) then hangs the command port.
+    SL is a stop on the stop port. If the drive still counts as in progress, the server refuses
+    other motions, and the usual stop (SM) hangs the command port.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -261,9 +261,9 @@ def test_every_quirk_has_its_sight() -> None:
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """If a quirk is on, its detector finds it.
+    """A detector finds its quirk if this quirk is on, and does not find it if this quirk is off.
 
-    If this quirk is off and the other quirks of the firmware are on, its detector does not find it.
+    In both cases, the other quirks of the firmware are on.
     """
     assert SEEN[name](replace(FIRMWARE, **{name: True}))
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
@@ -300,9 +300,10 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """A command has too few numbers. The quirk is off with which such a command crashes the server.
+    """Without the quirk ``crashes_on_missing_numbers``, such a command does not crash the server.
 
-    The server replies that the command's format is wrong. It then still answers HELLO.
+    A command has too few numbers. The server replies that the command's format is wrong.
+    Afterwards, it still answers HELLO.
     """
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
