@@ -41,7 +41,7 @@ DRIVER = 0
 
 
 Words = list[tuple[int, bytes]]
-"""The packets of one command: pairs of a descriptor and the bytes to write to it."""
+"""The packets of one command, as pairs: a file descriptor, and the bytes to write to it."""
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:

@@ -39,8 +39,8 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 ) -> None:
     """``process`` returns False if nothing is left to do after a read.
 
-    The session then has nothing to write and nothing to report. If a read contains only IMU
-    readings, nothing is left to do in most cases.
+    Nothing is left to do if the session has nothing to write and nothing to report. In most cases,
+    this is so after a read that contains only IMU readings.
     """
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0

@@ -41,9 +41,10 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """A silence is reported, and then a reading arrives.
+    """A silence that begins after a reading is a new silence, and is reported.
 
-    After another 2 s without data, a new silence is reported.
+    A first silence was reported before this reading. The new silence is reported after 2 s without
+    data.
     """
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
@@ -59,9 +60,9 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """This process stalls. At the end of the stall, older data may still wait to be read.
+    """After a stall of this process, the board has 2 s again before it counts as silent.
 
-    So the board has 2 s after the stall before it counts as silent.
+    The reason: at the end of the stall, data that the board has sent may still wait to be read.
     """
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)

@@ -19,9 +19,9 @@ Job = TypeVar("Job")
 
 
 def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
-    """Damage the bytes of a line.
+    """Damage the bytes of a line, and return the damaged pieces.
 
-    Return the pieces without the lost bytes, and with the added ones.
+    In these pieces, the lost bytes are missing, and the added bytes are included.
     """
     whole = b"".join(pieces)
     ends, at = [], 0

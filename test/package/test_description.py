@@ -94,9 +94,9 @@ def test_the_default_geometry_is_the_drivers() -> None:
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
     """The driver's kinematics convert a motion of the body to wheel rates.
 
-    The wheels of the description turn at these rates. Then each wheel rolls over the ground as fast
-    as the body moves in the rolling direction at the place of this wheel. Motion across the rolling
-    direction is not compared, because the rollers allow it.
+    The wheels of the description turn at these rates, and each wheel rolls over the ground. The
+    speed of rolling equals the speed of the body at the place of this wheel, in the rolling
+    direction. Motion across the rolling direction is not compared, because the rollers allow it.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -59,9 +59,9 @@ def drive(probe: Probe, board: PtyBoard) -> None:
 
 
 def drive_away(probe: Probe, board: PtyBoard) -> None:
-    """Drive forward and stop, until the robot is more than 0.1 m away.
+    """Drive forward and stop, repeatedly, until the robot is more than 0.1 m away.
 
-    More than one drive may be necessary, because the robot may stop early on a busy computer.
+    One drive is not always enough, because the robot may stop early on a busy computer.
     """
     for _ in range(20):
         drive(probe, board)

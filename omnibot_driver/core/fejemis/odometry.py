@@ -94,9 +94,10 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement from the previous pose to ``pose``, in a list.
 
-        The list is empty if there is no displacement (see ``pose``). Every 0.2 s, the list also
-        contains a PoseReading. The PoseReading is the sum of all displacements. The sum includes a
-        displacement even if the driver rejects it later.
+        The list is empty if there is no displacement (see the method ``pose``). Every 0.2 s, and
+        after a restart of the board, the list also contains a PoseReading. The PoseReading is the
+        sum of all displacements. The sum includes a displacement even if the driver rejects it
+        later.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

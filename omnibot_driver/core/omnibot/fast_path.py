@@ -81,7 +81,7 @@ class Walk:
         self.ends.append(end)
 
     def known_after(self, count: int, expectation: Expectation) -> Context:
-        """Return what is known after the first ``count`` frames."""
+        """Return what the decoder knows after the first ``count`` frames of this walk."""
         place = len(self.known) - 1
         while self.known[place][0] > count:
             place -= 1
@@ -95,11 +95,10 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a frame begins at ``at``, the end of a frame with unusual content.
 
-    If a frame begins there, the unusual content comes from a shock of the robot, not from damage.
-    The result is False if the bytes after the frame at ``at`` cannot begin another frame.
+    If a frame begins there, a shock of the robot has caused the unusual content, not damage. The
+    result is also False if the bytes after the frame at ``at`` cannot begin another frame.
 
-    ``closed``: whether no more bytes come. If ``at`` is the end of ``held``, the result is
-    ``closed``.
+    ``closed``: whether no more bytes come. If ``held`` ends at ``at``, the result is ``closed``.
     """
     if at == len(held):
         return closed

@@ -22,8 +22,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: the new position in the sequence when a frame of ``kind`` arrives at the
-    position ``at``. If the sequence has another kind at ``at``, the positions up to the next
+    ``after[kind][at]``: the position in the sequence after a frame of ``kind`` has arrived at the
+    position ``at``. If the sequence has another kind at ``at``, all positions up to the next
     ``kind`` are skipped.
     """
 

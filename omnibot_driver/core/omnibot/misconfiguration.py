@@ -25,8 +25,8 @@ LARGEST: Final = 1e7
 A value outside was read in the wrong byte order.
 """
 POSE_PERIODS: Final = 2
-"""Longest time between two poses that are compared, in periods of the poses. The value of 2 allows
-one lost pose between them."""
+"""Longest time between two poses that are compared with each other, in periods of the poses. With
+the value 2, the pose between them may be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).

@@ -2,8 +2,8 @@
 
 """Settings of the two simulated Teensys and their robot: sizes, firmware, planned faults.
 
-``Firmware`` has one switch for each point that the manual does not decide, or on which the manual
-and other sources differ.
+``Firmware`` has one switch for each open point. A point is open if the manual does not decide it,
+or if the manual and other sources differ.
 """
 
 from dataclasses import dataclass, field

@@ -53,8 +53,8 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Force and torque are converted to one effort for each wheel, in the same way as a velocity is
-    converted to wheel speeds. These efforts are added to the motors' efforts.
+    Force and torque are converted to one effort for each wheel. The conversion is the same as from
+    a velocity to wheel speeds. The effort of each wheel is added to its motor's effort.
     """
 
     x_pwm: float = 0.0

@@ -24,7 +24,7 @@ Large residuals may mean that commands were delayed. Delayed commands have two e
 residuals are twice as large, and the delay that the tool finds for the wheel is 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
-"""Largest accepted ratio of the motor model's residuals to those of the second-order model.
+"""Largest accepted ratio of two residuals: the motor model's, divided by the second-order model's.
 
 Above this ratio, the tool regards the motor model as wrong.
 """

@@ -213,7 +213,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the ratio of turns by gyro to turns by odometry, and the sum of all turns in rad.
 
-    In the sum, left and right turns are both positive. The result is None if odometry has no turns.
+    Left and right turns both increase the sum. If the odometry has no turns, the result is None.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

@@ -74,10 +74,10 @@ def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: floa
 
 
 def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
-    """The line is interrupted in both directions. Meanwhile, the user commands a stop.
+    """The covariance includes the distance that the robot drives after a lost stop.
 
-    The stop does not arrive, so the robot drives on. The covariance includes the distance that the
-    robot drives after the lost stop.
+    The line is interrupted in both directions. Meanwhile, the user commands a stop, which does not
+    arrive. So the robot drives on.
     """
     rig = Rig(nominal("firmware"), HOST_GAINS)
     rig.run(4.0)
@@ -90,11 +90,11 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 
 
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
-    """Most reports are lost. All reports that arrive have the same speed of the right wheel.
+    """The covariance includes the error that occurs if a wheel rests and most reports are lost.
 
-    The board repeats the last speed of a wheel at rest. So the right wheel may be at rest, and the
-    estimated heading may be wrong. The standard deviation of the heading is at least half of this
-    possible error.
+    All reports that arrive have the same speed of the right wheel. The board repeats the last speed
+    of a wheel at rest. So the right wheel may be at rest, and the estimated heading may be wrong.
+    The standard deviation of the heading is at least half of the possible heading error.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -114,9 +114,9 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 ) -> None:
     """In a drive backward, reports are lost for 0.9 s.
 
-    In this time, the wheels may change their speeds. So the standard deviation of the heading grows
-    more than without this gap. It grows even more if the speed of a wheel went up and down before
-    the gap.
+    In this gap, the wheels may change their speeds. So the standard deviation of the heading grows
+    more than without a gap. If the speed of a wheel went up and down before the gap, it grows even
+    more.
     """
 
     def grown_deg(gap_s: float) -> float:

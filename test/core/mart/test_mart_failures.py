@@ -150,8 +150,8 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 ) -> None:
     """The IMU dies in a motion. The driver stops the robot, and reports that the server is lost.
 
-    It refuses motion until the server is restarted. The variant "source" reports headings only in
-    forward drives, so no other motion is tested with this variant.
+    It refuses motion until the server is restarted. The server variant "source" reports headings
+    only in forward drives, so this variant is tested with forward drives only.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

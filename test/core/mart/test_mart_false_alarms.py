@@ -24,11 +24,10 @@ wheels of this robot turn for longer than this time.
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
-    """One heading cannot show that the heading is constant.
+    """The time without a change of the heading begins at the first heading of a drive.
 
-    Therefore, the driver measures the time without a change of the heading from the first heading
-    of a drive, and not from the start of the drive. Here, the first heading comes 0.7 s after the
-    start.
+    It does not begin at the start of the drive, because one heading cannot show that
+    the heading is constant. Here, the first heading comes 0.7 s after the start.
     """
     heading = RelativeHeading()
     heading.begin(10.0, anew=True)
@@ -104,7 +103,7 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """A motor is stuck, so the turn towards a goal does not begin. The driver discards the goal.
 
-    The server reports the failure "start timedout". This failure alone is no reason to discard a
+    The server reports the failure "start timedout". This failure alone is not a reason to discard a
     goal: the server also reports it if a heavy robot still moves some time after a turn. In that
     case, the driver continues to the goal.
     """
@@ -146,9 +145,9 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn has a wrong rate, so the driver stops it and starts it again, with other motor units.
 
-    The reply to the stop gives no angle: the stop takes too long, or the reply comes too late. So
-    the driver measures the motors' speed by the encoder, and computes the new motor units from this
-    speed.
+    To compute these units, the driver needs the speed of the motors. It measures the speed by the
+    encoder, because the reply to the stop gives no angle. There are two variants of the test: the
+    stop takes too long, or the reply comes too late.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

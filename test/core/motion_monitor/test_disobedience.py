@@ -211,9 +211,10 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """The robot drives away from its goal, so the motion monitor trips.
+    """The robot drives away from its goal, so the motion monitor reports a fault.
 
-    Goals are then refused. Otherwise a node that repeats its goal could restart the robot.
+    After the fault, the driver refuses goals. Otherwise a node that repeats its goal could set the
+    robot in motion again.
     """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)

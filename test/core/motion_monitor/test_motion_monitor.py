@@ -298,10 +298,11 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """The outlier filter marks some displacements as impossible, but does not reject them.
+    """Four impossible displacements in a row are a fault. A smaller number is not a fault.
 
-    Four such displacements in a row are a fault. A possible displacement begins the count at zero
-    again. While the robot rolls out after the fault, there is no second fault.
+    The outlier filter marks these displacements as impossible, but does not reject them. After a
+    possible displacement, the monitor counts from zero again. While the robot rolls out after the
+    fault, the monitor reports no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)

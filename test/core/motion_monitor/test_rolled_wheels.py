@@ -39,11 +39,11 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """The board reports displacements along the axes of the earth, or along those of the robot.
+    """``rolled`` is the right sum of the displacements, in the earth's axes and in the robot's.
 
-    In both cases, ``rolled`` is the right sum of the displacements. The test converts ``rolled`` to
-    wheel angles, and these angles back to a motion of the body. This motion has the turn of
-    ``rolled``.
+    The board reports displacements along the axes of the earth, or along those of the robot. The
+    test converts ``rolled`` to wheel angles, and these angles back to a motion of the body. This
+    motion turns the body by the same angle as ``rolled``.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):

@@ -165,10 +165,10 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Three deltas are lost between two reads. Each of the reads has more than 2 s of data.
+    """Three deltas are lost between two reads. Exactly three deltas are counted as lost.
 
-    In the first read, SEQ wraps. Exactly three deltas are counted as lost, and no restart is
-    reported.
+    Each of the two reads has more than 2 s of data, and SEQ wraps in the first read. Nevertheless,
+    no restart is reported.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]

@@ -180,10 +180,10 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, name: str, chunk_length: int, pause_s: float
 ) -> None:
-    """A pattern of bytes that is hard to decode is repeated. The work grows only linearly.
+    """The decoder's work grows only linearly, even for a pattern of bytes that is hard to decode.
 
-    So the last third of the stream costs about as much work as the second third. The decoder holds
-    fewer bytes than its limit.
+    The stream repeats this pattern. Because the work grows linearly, the last third of the stream
+    costs about as much work as the second third. The decoder holds fewer bytes than its limit.
     """
     stream = ADVERSARIES[name] * (THIRD // len(ADVERSARIES[name]))
     if chunk_length < THIRD:

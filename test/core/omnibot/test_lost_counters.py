@@ -89,10 +89,10 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 25, 26, 60, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """Frames are lost. Afterwards, no step of odom is faster than 2 m/s or 8 rad/s.
+    """After a loss of frames, no step of odom is faster than 2 m/s or 8 rad/s.
 
-    The first step is not faster either: it contains the motion of the whole gap, over its whole
-    duration.
+    This is also true for the first step after the gap: it contains the motion of the whole gap, but
+    it also lasts as long as the whole gap.
     """
     for seed in range(5 if lost < 60 else 2):
         _, estimates = over_a_gap(lost, seed, frame)
@@ -175,10 +175,11 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 @pytest.mark.parametrize("use_board_pose", [True, False])
 @pytest.mark.parametrize("phase", range(5))
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
-    """Deltas are lost, and a pose arrives before the next delta.
+    """The odometry includes the motion of lost deltas only once.
 
-    The pose already includes the motion of the lost deltas. Later, the counter of the next delta
-    shows that deltas were lost. The odometry does not add their motion a second time.
+    Deltas are lost, and a pose arrives before the next delta. This pose already includes the motion
+    of the lost deltas. Later, the counter of the next delta shows that deltas were lost. The
+    odometry does not add their motion again.
     """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)

@@ -72,7 +72,7 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
     """A robot that accelerates to the left measures a negative acceleration along y.
 
     The sensor is mounted upside down, so y is reversed. In the test, the robot accelerates forward
-    and to the left. The sum of the measured accelerations over time is the speed.
+    and to the left. The measured accelerations, added up over time, give the speed of the robot.
     """
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
