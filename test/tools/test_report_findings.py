@@ -77,7 +77,7 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
     """The board is lost for a while. The report mentions this loss once, from the driver's state.
 
-    The loss also causes gaps in the board's data. The report does not mention these gaps as well.
+    The loss also causes gaps in the board's data. The report does not mention these gaps.
     """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)

@@ -127,9 +127,9 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn on a good network, the driver can first download the server's record of the
-        turn. It then learns from this record, because the record is more exact than the wheel's
-        measurement.
+        After a turn on a good network, the driver first downloads the server's record of the turn,
+        if it still needs records, and if no other job is in progress. It then learns from this
+        record, because the record is more exact than the wheel's measurement.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -217,7 +217,7 @@ class Moves(Asking):
         The result is False in two cases. In the first case, the driver has sent no stop after the
         move. In the second case, the move was complete, and the server answered again very soon: it
         cannot have run the move a second time, because a second run would have delayed the answer
-        more. The delay does not depend on whether a stop ends the second run.
+        more, whether a stop ended this run or it ended by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
@@ -232,7 +232,7 @@ class Moves(Asking):
         self._notice(CONTRADICTED.format(asked_deg, seen_deg) + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
-        """Discard the goal, because the network may have delivered the last move to it twice."""
+        """Discard the goal, because the network may have delivered its last move twice."""
         if self._move is None or self._move.given_up:
             return
         self._move.fail()

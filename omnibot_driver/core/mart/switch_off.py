@@ -93,8 +93,8 @@ class SwitchOff:
         After MOST_MISSES unanswered requests in a row, the driver allows motions again. If the last
         of these requests was MCS, the driver also stops using MCS until the next connection.
 
-        The server may still execute an unanswered MCS later. It then refuses the next motion. The
-        driver therefore sends MSM, which ends the direct control by MCS.
+        The server may still execute an unanswered MCS later, and then refuses the next motion. If
+        this happens, the driver sends MSM, which ends the direct control by MCS.
         """
         self._misses += 1
         if self._misses < MOST_MISSES:

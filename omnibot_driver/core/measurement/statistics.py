@@ -54,8 +54,8 @@ class StreamStatistics:
     _sent_imu: int | None = field(default=None, repr=False)
     """Number of IMU readings that the board had sent before the last displacement.
 
-    It is the sum that ``imu`` and ``lost_imu`` had at that displacement. It is None if the number
-    is unknown.
+    It is the sum that ``imu`` and ``lost_imu`` had at that displacement, plus the readings of the
+    displacements that were lost before a pose. It is None if the number is unknown.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
 

@@ -103,7 +103,9 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the control law ``law``, within ``bounds``; then stop it. Return a log.
+        """Move the robot by the control law ``law``, within ``bounds``. Then stop it.
+
+        Return the log of the motion.
 
         ``obeys``: whether to raise an error if the robot does not move.
 

@@ -41,10 +41,10 @@ class Stream:
 
     ``running``: the states of the driver in which the driver publishes the topic.
 
-    ``lost``: the counts of lost messages, as keys of the driver's diagnostics.
+    ``lost``: keys of those values in the driver's diagnostics that count lost messages.
 
-    ``rates``: the rate of the topic, as keys of the driver's diagnostics. The first key that has a
-    value is used.
+    ``rates``: keys under which the driver's diagnostics may contain the rate of the topic. The
+    first key that has a value is used.
     """
 
     name: str

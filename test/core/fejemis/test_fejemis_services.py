@@ -78,8 +78,8 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
     """Every command to calibrate is lost, so the offsets stay unchanged. The user's request fails.
 
-    The driver can rely on the offsets, because a real calibration always changes them a little: the
-    sensor has noise.
+    Unchanged offsets show that there was no calibration. A real calibration always changes them a
+    little, because of sensor noise.
     """
     bench = nominal()
     lose(bench, word.encode(), 99)

@@ -120,7 +120,7 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """The driver stalls. The terminal's buffer becomes full, and all bytes after that are lost.
+    """The driver stalls. The terminal's buffer becomes full, so later bytes are lost.
 
     After the stall, the reads follow each other without a pause. Still, no sample gets a stamp that
     lies in the time in which bytes were lost.

@@ -374,8 +374,8 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     """The network may duplicate the request of a speed change. The change then acts twice.
 
     Only the heading can show that a change has acted twice, and in a backward drive, the heading
-    may be unknown. So the driver limits each change: to 15 units in a forward drive, and to 5 units
-    in a backward drive.
+    may be unknown. So the driver limits each change: to 15 units in a forward drive, and, on a slow
+    network as in this test, to 5 units in a backward drive.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05
@@ -386,7 +386,8 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
 def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
     """A drive begins before the server has reported a heading.
 
-    All covariances are finite. The driver's checks of the odometry would reject other covariances.
+    All covariances are finite. The driver's checks of the odometry would reject a covariance that
+    is not finite.
     """
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 100.0)

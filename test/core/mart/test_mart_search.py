@@ -146,8 +146,9 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    While the server's command port is silent, two values cannot be seen: the motion, and the reason
-    for the silence. This function then replaces both values by fixed ones.
+    While the server's command port is silent, the server shows neither its motion nor the reason
+    for the silence. This function then replaces the values of both by fixed ones, and the value of
+    ``released`` too.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

@@ -90,7 +90,8 @@ def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
 ) -> None:
     """The right wheel gets stuck in a drive. The left wheel then turns the robot.
 
-    The driver does not measure the whole turn. The covariance covers the error of the heading.
+    The turn continues until the driver notices that a wheel is stuck. The driver does not measure
+    the whole turn. The covariance covers the error of the pose.
     """
     bench = MartBench("source").ready()
     bench.command(vx, 0.0, first_s)

@@ -239,9 +239,9 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """The reader is late in the middle of a frame. The rest of the frame waits, but is not lost.
+    """The reader is late in the middle of a frame. The next bytes wait, but none are lost.
 
-    The decoder completes the frame with these bytes, so no frame is lost.
+    The decoder completes the frame with the first of these bytes, so no frame is lost.
     """
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
