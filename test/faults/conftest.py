@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fixtures of the tests in which faults occur while the driver runs."""
+"""Fixtures of the tests of the fault campaign."""
 
 from collections.abc import Iterator
 from contextlib import nullcontext

@@ -130,7 +130,7 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
     """The picture of a long measurement omits points, so its file is smaller than 170 kB.
 
-    The reason is that noise does not compress well.
+    With all points, the file would be larger, because noise does not compress well.
     """
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"

@@ -95,8 +95,8 @@ class CommandPolicy:
         """Drop the current command, and repeat Stop until a standstill is proved.
 
         Stop is repeated for at least ``STOPPING_S``. If no proof arrives, the repetition ends after
-        ``UNPROVED_S``. If the e-stop is latched, the emergency stop is repeated instead of Stop,
-        until ``release`` is called.
+        ``UNPROVED_S``. If the e-stop is latched, the emergency stop is repeated until ``release``
+        is called.
         """
         self.current = None
         self.quiet = False

@@ -112,11 +112,11 @@ class Gate(Generic[Group]):
 class TicksGate(Gate[Ticks]):
     """Check of the reports of encoder ticks. ``ticks_per_revolution`` may be replaced at any time.
 
-    The times in the reports show whether the board's clock counts ms or ns. All later reports must
+    The times in the reports show whether the board's clock counts ms or ns. Later reports must
     then show the same unit.
 
-    ``too_fast``: number of reports in a row that were rejected only because of their counts. Their
-    clock is plausible, but their counts show a speed that no wheel can have.
+    ``too_fast``: number of reports in a row that were rejected although their clock is plausible.
+    Their counts show a speed that no wheel can have.
     """
 
     def __init__(self, ticks_per_revolution: int) -> None:

@@ -71,7 +71,10 @@ class RecordAssembler:
         self._damaged = self.begun
 
     def add(self, code: int, payload: int) -> list[Record | LostRecord]:
-        """Add a line. If it ends the record, return a list with the record, else an empty list."""
+        """Add a line. If it ends the record, return a list with the record, else an empty list.
+
+        If the record is damaged or not expected, the list contains a LostRecord instead.
+        """
         if not self.begun:
             self._begin(code)
         self._lines += 1

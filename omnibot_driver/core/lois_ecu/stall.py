@@ -61,8 +61,8 @@ class StallWatch:
         self.may_roll = [False, False]
         self._quiet = [0, 0]
         """For each wheel: number of reports without motion. Counting begins at zero when the wheel
-        turns, and when the wheel is commanded to turn. A report is counted only if it could have
-        shown a motion of the wheel."""
+        turns, when it is commanded to turn, and when a wheel is returned as stalled. A report is
+        counted only if it could have shown a motion of the wheel."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
@@ -117,7 +117,7 @@ class StallWatch:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
         At least ``AT_LEAST`` reports must show that the wheel does not turn. For a wheel that is
-        commanded backward, at least ``AT_LEAST_BACKWARD`` reports must show it. If one wheel is
+        commanded backward, at least ``AT_LEAST_BACKWARD`` reports must show it. If a wheel is
         returned as stalled, the times and the reports of both wheels are counted from zero again.
         """
         left, right = (

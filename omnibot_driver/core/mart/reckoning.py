@@ -30,7 +30,7 @@ from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 BEGIN_RADPS: Final = 0.03
 """Standard deviation, in rad/s, of the turn rate that unequal motors cause in a forward drive (RM).
 
-The value is used until the driver reads the first heading of the drive.
+The value applies to the time before the first heading of the drive.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
@@ -242,8 +242,8 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        It is possible that the start command was lost. Then the last encoder count is from before
-        the start, so the pose does not include this count. If the count is from after the start,
+        As long as the start command may have been lost, the last encoder count may be from before
+        the start. So the pose does not include this count. If the count is from after the start,
         however, the pose lacks the motion that this property returns. If there is no such count,
         both values are zero.
         """

@@ -52,10 +52,10 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The odometry names the source of its estimates, which depends on the direction of the drive.
+    """The odometry names the source of its estimates, for example "ticks" in a forward drive.
 
-    In a forward drive, the source is "ticks". In a backward drive, the public firmware counts no
-    ticks, so the source is "commands and heading".
+    In a backward drive, the public firmware counts no ticks, so the source is "commands and
+    heading".
     """
     rig = settled(firmware)
     rig.order(20, 20, 3.0)
@@ -303,7 +303,7 @@ def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     """
 
     def variance() -> float:
-        """Return the variance, in (m/s)², of the speed after a report with 4 ticks too many."""
+        """Return a predicted speed's variance in (m/s)², after a report with 4 ticks too many."""
         odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
         odometry.wrote(SetRpm(20, 20), 0.0)
         for step in range(52):

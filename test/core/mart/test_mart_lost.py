@@ -76,7 +76,7 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     """The IMU dies in a motion, so the server hangs when the driver commands a stop.
 
     The driver uses the stop port, which then hangs. When the IMU works again, the server answers
-    all requests that have waited, and the network reorders the replies. The driver refuses motion,
+    all waiting requests at once, and the network reorders the replies. The driver refuses motion,
     even if the server's name arrives before the reply to the stop command.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
