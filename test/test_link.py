@@ -73,8 +73,8 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 ) -> None:
     """The guard process gets at most ten heartbeats a second, although the pacer runs more often.
 
-    The reason: if a guard does not read its heartbeats, the driver regards it as hung and replaces
-    it. With more heartbeats, the driver would also replace a guard that is only slow.
+    The reason: if a guard has many unread heartbeats, the driver regards it as hung and replaces
+    it. At a higher rate of heartbeats, the driver would also replace a guard that is only slow.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")

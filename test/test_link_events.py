@@ -70,7 +70,7 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """A listener hangs. A caller's e-stop and repeated commands do not wait for it.
+    """A listener hangs. Neither a caller's e-stop nor the repetition of a command waits for it.
 
     When the listener runs again, it gets its events in order.
     """

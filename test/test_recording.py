@@ -117,7 +117,7 @@ def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why:
 def test_a_bag_without_the_wire_says_how_to_record_it(tmp_path: Path) -> None:
     """A bag without raw bytes is refused. The message says how to record them.
 
-    The driver records raw bytes only with ``publish_raw``.
+    The driver publishes raw bytes only with ``publish_raw``, so without it no bag can have them.
     """
     path = bag(tmp_path / "bag", "/odom", kind="std_msgs/msg/String")
     with pytest.raises(ParameterError, match="record with `publish_raw: true`"):

@@ -137,9 +137,9 @@ def few_bytes(received: Received, random: Random) -> Chunks:
 
 
 def whole_bursts(received: Received, random: Random) -> Chunks:
-    """Hold all bytes until the line is idle for 3 ms, and then deliver them at once.
+    """Deliver all waiting bytes when the line becomes idle, as some adapters do.
 
-    Some adapters do this.
+    A gap of more than 3 ms between two bytes counts as idle.
     """
     times = received.times_s
     ends = [n for n in range(1, len(times)) if times[n] - times[n - 1] > 3e-3] + [len(times)]

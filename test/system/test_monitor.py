@@ -212,10 +212,9 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 def test_keys_pressed_while_it_was_suspended_move_nothing(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The monitor is suspended after it has moved the robot. Meanwhile, the user presses keys.
+    """The monitor is suspended while it steers, so the robot stops. Then the user presses keys.
 
-    When the monitor runs again, it does not send commands for these keys. So the robot does not
-    move.
+    When the monitor runs again, it sends no motion commands for these keys.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

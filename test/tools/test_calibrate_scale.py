@@ -31,7 +31,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 
     ``true``: the scales that the board really has.
 
-    ``gyro``: the rate that the gyro measures, divided by the true yaw rate.
+    ``gyro``: factor on the yaw rate that the gyro measures. With 1, the gyro is right.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)

@@ -80,10 +80,10 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The motion monitor stops the robot for the second time, but this stop counts as a first stop.
+    """The motion monitor stops the robot again, but the interlock treats this stop as a first stop.
 
-    There are two reasons for this: more than a minute has passed since the previous stop, or
-    ~/start was called since then. After a first stop, motion is allowed again without ~/start.
+    There are two cases: more than a minute has passed since the previous stop, or ~/start was
+    called since then. After a first stop, motion can be allowed again without ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):

@@ -26,7 +26,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 def late(chance: random.Random) -> float:
     """Return a random delay of a read, in s.
 
-    The delay is about 0.36 ms. One read in a hundred has an additional delay of up to 20 ms.
+    Usually, the delay is about 0.36 ms. For 1 % of the reads, it is up to 20 ms longer.
     """
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s

@@ -245,8 +245,8 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
     """While a board with the public firmware sends a record, its clock stops for 0.12 s.
 
-    So the time in the next tick report is 0.12 s behind. The driver does not regard this report as
-    late. Therefore ``odom`` does not jump some seconds later, even if lines of the record are lost.
+    The driver does not regard the tick reports after the record as late. So ``odom`` does not jump
+    some seconds later, even if lines of the record are lost.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)

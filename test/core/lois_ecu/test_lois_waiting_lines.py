@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of lines that wait while a LOIS ECU drives: settings must wait, the LED's line need not."""
+"""Tests of lines to a LOIS ECU while the robot drives: settings wait, the LED's line is sent."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure

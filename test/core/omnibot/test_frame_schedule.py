@@ -55,10 +55,10 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """An IMU frame directly before a pose is lost.
+    """An IMU frame and a delta are lost before a pose.
 
-    When the pose arrives, the schedule cannot count this loss yet. It counts the loss when the
-    frame after the pose arrives.
+    When the pose arrives, the schedule cannot count the lost IMU frame yet. It counts this frame
+    when the frame after the pose arrives.
     """
     rhythm = nominal(0)
     for _ in range(4):
@@ -71,10 +71,9 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """If the last 30 frames were IMU frames, the board is in IMU-only mode.
+    """After 30 IMU frames without another frame, only IMU frames can have been lost.
 
-    It sends no other frames in this mode. So the schedule counts all damaged bytes as lost IMU
-    frames.
+    So the schedule counts all damaged bytes as lost IMU frames.
     """
     rhythm = nominal(0)
     for _ in range(30):

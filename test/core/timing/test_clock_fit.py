@@ -32,7 +32,7 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """Only upper bounds of the ticks' times are known, because each tick is read with some delay.
+    """Only upper bounds of the ticks' true times are known.
 
     The fitted clock follows the ticks with the smallest delay, and its slope is right.
     """
@@ -53,7 +53,7 @@ def test_between_near_bounds_the_middle_is_taken() -> None:
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
     """For 8 s, both bounds of the ticks' times drift away from the true times by 0.1 ms/s.
 
-    The fitted clock follows this drift only a little: its error stays below 0.5 ms.
+    Nevertheless, the error of the fitted clock stays below 0.5 ms.
     """
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
@@ -83,7 +83,7 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For 4 s, reads are slightly late. Their lower bounds are then above the upper bounds.
+    """For 4 s, reads are slightly late. Their lower bounds contradict other upper bounds.
 
     A tick is never later than its upper bound, so the fit discards these lower bounds.
     """

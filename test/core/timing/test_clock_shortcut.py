@@ -26,7 +26,7 @@ pytestmark = interpreted_only
 WHOLE = SampleBoundary(0, 0.0, 13 * 10 / 115200)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 SETTLING = 40
-"""Number of ticks that must arrive on time before the clock can use its shortcut."""
+"""Number of ticks after which the clock can use its shortcut, if all of them arrive on time."""
 Read = tuple[list[Reading], float, SampleBoundary | None]
 
 

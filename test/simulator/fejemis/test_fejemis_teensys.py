@@ -90,7 +90,7 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 ) -> None:
     """A half ignores its input until its boot ends. Some firmware then sends a start line.
 
-    In all lines of the half, the time is counted from the beginning of the boot.
+    The times in the half's lines are counted from the beginning of its boot.
     """
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now

@@ -211,8 +211,8 @@ def test_cs_5_minus_5_turns_left() -> None:
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
     """A speed change (CS or RMCS) cannot reverse a motor. It stops the motor instead.
 
-    It cannot make a motor faster than full speed either. Then it makes the other motor slower
-    instead.
+    It cannot make a motor faster than full speed either. If a motor would exceed full speed, the
+    other motor becomes slower instead.
     """
     rig = Rig()
     rig.drive(start, 0.5)
@@ -320,7 +320,7 @@ def test_an_obstacle_ends_rm_and_srm_tells() -> None:
 
 
 def test_backward_rm_sees_no_obstacle() -> None:
-    """RM with a negative speed drives backward. The server reads only the front sonar during RM.
+    """RM with a negative speed drives backward. The server does not read the rear sonar during RM.
 
     So it does not notice an obstacle behind, and the robot hits the wall.
     """
@@ -371,7 +371,7 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 
 
 def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
-    """MCS controls the motors directly: it sets the registers of the right and the left motor.
+    """MCS controls the motors directly: it sets their registers, the right motor's register first.
 
     After MCS, the server refuses another MCS and all motions until the command MSM comes.
     """

@@ -127,8 +127,8 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
     """The speed change CS comes with one number instead of two while the robot is at rest.
 
-    The server refuses it before it reads the numbers. So it does not crash, as it does during a
-    motion.
+    The server refuses CS before it reads the numbers, so it does not crash. During the drives F and
+    B, the same command crashes it.
     """
     assert Rig().ask("CS 5") == "fail"
 

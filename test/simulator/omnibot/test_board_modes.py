@@ -207,7 +207,7 @@ def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() ->
     """A receiver that looks for idle gaps discards an incomplete frame after a gap.
 
     A caller can give the simulated board the arrival times of the bytes. Then the board computes
-    the gap from these times. Otherwise it counts the ticks between two calls.
+    the gap from these times. Without such times, it measures the gap in ticks.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

@@ -61,7 +61,7 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command a velocity at 10 Hz, from the call until the context ends.
+    """Command a velocity at 10 Hz until the context ends.
 
     The body of the context begins when the robot moves. ``vx`` is in m/s, and ``yaw`` in rad/s.
     """
