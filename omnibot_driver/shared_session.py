@@ -65,8 +65,8 @@ class SharedSession:
         is True).
         """
         self.stood = False
-        """Whether Stop was sent when the link ended, and measurements then showed the robot at
-        rest."""
+        """Whether, at the end of the link, Stop was sent and measurements had shown the robot at
+        rest. No motion was commanded since these measurements."""
         self.closing = threading.Event()
         """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write

@@ -28,8 +28,8 @@ PAIR_WITHIN_S: Final = 0.005
 """Limit, in s, for the time between the two lines of a pair. If this time is as long as the
 limit or longer, the pair may be false, so the pair must wait for the next pose."""
 SILENT_S: Final = 0.1
-"""Length in s of a silence of the board. After a longer silence, each new pair must wait for the
-next pose.
+"""Length in s of a time without gyro and acceleration lines. After a longer time without these
+lines, each new pair must wait for the next pose.
 
 The pair must wait even if its two lines come close together. From the next pose, the driver
 learns whether the board sent nothing, or whether the host only read late. If the board sent
@@ -82,7 +82,7 @@ class Pair:
     ``skipped``: how many incomplete samples were left out since the previous pair.
 
     ``doubtful``: whether the pair must wait for the next pose. It must wait if it may be false, or
-    if it came after a silence or a stall.
+    if it came after a silence, or soon after a stall of the driver.
 
     ``next_pose_s``: the board's time of the next pose, if this pose arrived before ``take``
     returned the pair.

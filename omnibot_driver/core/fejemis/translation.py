@@ -40,9 +40,9 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Largest age of the last IMU sample, in s, for which an orientation is published. The driver
-publishes each orientation together with the last IMU sample. If this sample is older, the
-orientation is discarded."""
+"""Limit, in s, for the age of the last IMU sample when an orientation arrives. The driver publishes
+each orientation together with the last IMU sample. If the age of this sample is as long as the
+limit or longer, the orientation is discarded."""
 
 
 class Translation:

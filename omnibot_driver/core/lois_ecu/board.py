@@ -44,9 +44,10 @@ RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
 This time is long enough for stopped wheels to come to rest, and for four tick reports to arrive.
-After the last repetition, the driver gives the reset up in less than ``UNPROVED_S``. Each
-repetition restarts ``UNPROVED_S``. So the driver never takes small counts that do not change for
-the proof of a reset that would have set them to zero.
+After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. A repetition
+restarts this time if the counts do not change and a reset would set them to zero. After the last
+repetition, the driver gives the reset up before this time has passed. So the driver never accepts
+such counts.
 """
 STEADY_S: Final = 0.3
 """Time in s. If the tick counts do not change for this time, the wheels are regarded as at rest.

@@ -98,7 +98,8 @@ class LoisDecoder:
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
         """Expect a record, and discard all other records.
 
-        ``left``, ``right``: number of samples in the record, for the left and the right wheel.
+        ``left``, ``right``: number of samples of the left and the right wheel in the record. For
+        headings, ``left`` is the number of headings, and ``right`` is 0.
         """
         self._assembler.expect_record(kind, left, right)
 

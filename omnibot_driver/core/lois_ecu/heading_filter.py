@@ -89,9 +89,9 @@ class HeadingFilter:
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
     """Return the heading that is expected now, from -180 to 180 degrees.
 
-    It follows from the previous heading and from the change of the yaw since then.
+    It follows from an earlier heading and from the change of the yaw since then.
 
-    ``before``: the previous heading in degrees, and the yaw in rad at that time.
+    ``before``: this earlier heading in degrees, and the yaw in rad at that time.
     """
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 

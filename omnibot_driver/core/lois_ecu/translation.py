@@ -110,8 +110,8 @@ class Translation:
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._dated = False
-        """Whether the GPS has ever reported a date. At midnight ``_date`` becomes unknown, but
-        this value stays True."""
+        """Whether the last date that the GPS reported is a real one. At midnight ``_date``
+        becomes unknown, but this value does not change."""
         self._clock = (0, 0, 0)
         self._gps_works = False
 

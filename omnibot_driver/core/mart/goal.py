@@ -27,8 +27,8 @@ in m.
 The robot could only come nearer with another turn and another straight move.
 """
 STRETCH: Final = 1.3
-"""Assumed ratio of driven to requested length of a straight move. A measurement of such a move
-replaces it.
+"""Ratio of driven to requested length of a straight move. The driver assumes this ratio until it
+has measured such a move for the first time.
 
 For example, 12 requested inches become 15.8 driven inches.
 """
@@ -150,7 +150,7 @@ class Move:
 
         If the goal is in progress, it continues. If the goal has failed, it begins anew. If the
         robot has reached the goal, it makes another straight move only if it is now more than
-        ENOUGH_M (m) away, for example because somebody has pushed it.
+        ENOUGH_M (m) away from the goal.
         """
         if not self.given_up:
             return self

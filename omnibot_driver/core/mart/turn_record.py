@@ -2,9 +2,9 @@
 
 """The angle of a controlled turn, as the server has recorded it in a file (LAST TURN).
 
-The public server never closes a file after it has sent it. So it can send only about 1,000 files
-until it is restarted. For this reason, the driver downloads only a few. This module knows the form
-of the file; it does not know when the file is downloaded.
+The public server never closes a file after it has sent it, and it can have only about 1,000 files
+open. For this reason, the driver downloads only a few files. This module knows the form of the
+file; it does not know when the file is downloaded.
 """
 
 import re
@@ -94,8 +94,8 @@ class TurnRecords:
 
         ``told_rad``: the angle of the turn in the record.
 
-        ``wheel_rad``: the part of this angle that comes from the motion of the right wheel. With
-        equal motors, it is half of the angle.
+        ``wheel_rad``: the part of the turn that the right wheel has caused. With equal motors, this
+        is half of the turn.
         """
         self._failures = 0
         self._told_rad += abs(told_rad)

@@ -311,8 +311,8 @@ class _Spikes:
         ``step``: size of the change. It need not be exactly the value of a bit, because the
         readings vary: the recent variation is tolerated.
 
-        ``value``: magnitude after the change. If it is at the end of the scale, the highest bit
-        does not count, because a knock against the robot can also cause such a value.
+        ``value``: magnitude after the change. If it is at the end of the scale, the result is
+        False, because a knock against the robot can also cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

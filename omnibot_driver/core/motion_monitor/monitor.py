@@ -144,7 +144,7 @@ class MotionMonitor:
         return fault not in told
 
     def count_refused(self, count: int, now: float) -> Fault | None:
-        """Return a fault if four displacements in a row were rejected, otherwise None.
+        """Return the fault that four rejected displacements in a row show, or None.
 
         ``count``: number of displacements that the outlier filter has rejected since the driver
         began.
@@ -156,12 +156,12 @@ class MotionMonitor:
         return self._exceed(now)
 
     def count_impossible(self, now: float) -> Fault | None:
-        """Return a fault if this is the fourth impossible displacement in a row, otherwise None.
+        """Return the fault that four impossible displacements in a row show, or None.
 
         Call this method instead of ``check`` for an impossible displacement of a board that
         corrects its own odometry. The outlier filter passes such a displacement on, because it may
-        be a correction. Up to three in a row are regarded as corrections. Four show that the robot
-        is really too fast.
+        be a correction. Fewer than four in a row are regarded as corrections of the board's
+        odometry.
         """
         self._error.reset()
         self._impossible += 1
@@ -209,8 +209,7 @@ class MotionMonitor:
     def _exceed(self, now: float) -> Fault | None:
         """Return the fault of a robot that is faster than its physical limits.
 
-        The result is None if a fault was found a short time ago, because the robot may then still
-        be slowing down.
+        The result is None if the robot may still be slowing down after an earlier fault.
         """
         history = self._history
         if history.current is None or history.driven(now - LAG_S):

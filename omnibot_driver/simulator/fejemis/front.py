@@ -31,7 +31,7 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``wanted_deg``: angle that the steered wheel must reach; None before the first ``rc`` command.
 
-    A test or user simulates faults of the angle sensor with the other attributes:
+    The caller simulates faults of the angle sensor with these attributes:
 
     ``diagnosis``, ``error_flags``: status bits that the ``fwl`` line reports. They do not include
     the frame counter.
