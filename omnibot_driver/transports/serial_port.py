@@ -29,8 +29,8 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""Options of a network socket. If the peer does not acknowledge data for five seconds, it is
-regarded as lost."""
+"""Options of a network socket. If the peer acknowledges nothing for five seconds, neither data nor
+keepalive probes, it is regarded as lost."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Major device numbers of pseudo-terminals in Linux."""
 
@@ -184,7 +184,8 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 def _write_whole(descriptor: int, data: bytes) -> None:
     """Write all bytes. While the port accepts none, sleep; pyserial would not sleep.
 
-    Raises TimeoutError if the port has not accepted all bytes after 0.2 s (``WRITE_TIMEOUT_S``).
+    Raises TimeoutError if the port accepts no further bytes, and 0.2 s (``WRITE_TIMEOUT_S``) have
+    passed since the beginning of the write.
     """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:

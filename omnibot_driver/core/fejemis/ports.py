@@ -80,7 +80,8 @@ class Ports:
     def identify(self) -> bool:
         """Find out which board is at which port. Call this after a heartbeat.
 
-        Return whether the order of the boards has changed since it was last known.
+        Return whether the known order of the boards has changed. At first, the driver assumes the
+        expected order.
         """
         first, second = (half.role for half in self.halves)
         if first == second:
@@ -118,8 +119,8 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        If the port of this board is not known, the lines go to each port whose board is not
-        identified. If both boards are identified, they go to both ports.
+        If the port of this board is not known, the lines go to each port whose board has no known
+        role. If both boards have the same role, the lines go to both ports.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

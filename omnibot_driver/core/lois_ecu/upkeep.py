@@ -91,8 +91,8 @@ class Upkeep:
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
         """Return the bytes that change the terminal mode, or no bytes if nothing is due.
 
-        The first bytes are zero set-points, because the robot must be at rest. The lines that set
-        the mode follow later.
+        The first calls return zero set-points, because the robot must be at rest. Later calls
+        return the lines that set the mode.
         """
         change, with_sum = self.change, self.writer.settings.with_sum
         if stop := change.stops(now, stands=stands, cleared=self._points.cleared):

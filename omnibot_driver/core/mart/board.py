@@ -84,9 +84,9 @@ class MartBoard(Board):
     def mode(self) -> Mode:
         """The mode of the board.
 
-        The mode becomes nominal when the server has answered the driver's first stop command. It
+        The mode becomes nominal when the server has answered the first stop of the connection. It
         stays unknown in two cases: the server is lost, or the reply to HELLO has shown that the
-        server is of an unsupported kind.
+        server is not a motion controller.
         """
         return self._mode
 

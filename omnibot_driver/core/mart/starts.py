@@ -125,9 +125,9 @@ class Starts(FailedStarts):
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return whether a late reply to an earlier HELLO could hide a duplicate of ``start``.
+        """Return whether an earlier HELLO may reach the server after ``start``, a controlled move.
 
-        Only controlled moves are concerned. The server might answer the HELLO just before it
+        For other starts, the result is False. The server might answer the late HELLO just before it
         executes a duplicate of the move. From this answer, the driver would wrongly conclude that
         there is no duplicate. After a fresh check of the IMU, this cannot happen: the driver waits
         before such a check, so no earlier HELLO can arrive after it.

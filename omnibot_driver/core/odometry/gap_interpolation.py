@@ -13,8 +13,8 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated. The robot seldom
-moves longer in a gap, because the driver stops it when the board sends no data."""
+"""Longest time, in s of the board's clock, over which motion is interpolated. The robot is
+unlikely to move longer in a gap: if the board sends no data, the driver stops the robot earlier."""
 NO_WAY: Final = Pose()
 
 

@@ -96,8 +96,8 @@ LOOK_ALIKE: Final = 12.0
 Such a frame is probably misread: what looks like its header is a gyro value of -6 of another frame.
 """
 JUMP: Final = 2.5
-"""Cost of a counter that did not advance by one. Such a counter means that a frame before it was
-lost."""
+"""Cost of a counter that did not advance by one. It is the cost of the assumption that a frame
+before it was lost."""
 IMPOSSIBLE: Final = 2.0
 """Cost of a movement that a robot with this board cannot make."""
 OFF_BEAT: Final = 1.0

@@ -34,8 +34,8 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""Cost of content from which on a frame must wait. The decoder accepts the frame, or rejects it,
-when it knows the bytes after the frame."""
+"""A frame must wait if the cost of its content is at least this value. The bytes after the frame
+then decide whether the decoder accepts it."""
 DOUBT_BYTES: Final = 170
 """Largest number of uncertain bytes. When it is reached, the decoder decides on their first half.
 In nominal mode, the board sends this number of bytes in 100 ms."""

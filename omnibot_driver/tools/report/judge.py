@@ -59,8 +59,8 @@ def _all(log: Log) -> Iterator[Finding]:
 def _has_no_imu(log: Log) -> bool:
     """Return whether the diagnostics show that the board has no IMU.
 
-    For a board with an IMU, the driver's Stream status counts IMU frames. The board has no IMU if
-    there is a Stream status without such a count.
+    For a board with an IMU, the driver's Stream status has values for the IMU. The board has no IMU
+    if Stream statuses were recorded, and none of them has such a value.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     return bool(streams) and not any("IMU" in key for item in streams for key in item.values)

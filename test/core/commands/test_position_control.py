@@ -87,7 +87,8 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
     """The robot turns to a goal by less than half a turn, also after several full turns.
 
-    The board's heading includes the full turns. The driver adds them to the heading of a goal.
+    The board's heading counts full turns, and may begin several turns away from zero. So the driver
+    converts the heading of a goal to the equivalent one that is nearest to the board's heading.
     """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))

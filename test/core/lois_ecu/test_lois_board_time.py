@@ -128,8 +128,8 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
     """If reads are often late, one more late read is not irregular.
 
-    Reads are up to 0.1 s late at random. A read that is 0.1 s late is then not irregular. A read
-    that seems early is always irregular, because no read can be early.
+    Reads are up to 0.1 s late at random. A read that is 0.1 s late is then not irregular. But a
+    read that seems 0.06 s early is irregular, because no read can be early.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

@@ -217,10 +217,10 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """Tick counts that jump are dropped, except if the next report continues from them.
+    """The decoder drops a report whose tick counts jump, and then accepts what continues from it.
 
-    The decoder discards a report whose tick counts jump. If the next report continues from the new
-    counts, the board has restarted, so the decoder returns this next report.
+    If the next report continues from the new counts, the board has restarted. The decoder then
+    returns this next report, but not the report with the jump.
     """
     decoder = LoisDecoder()
     said = [

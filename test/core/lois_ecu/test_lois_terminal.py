@@ -341,11 +341,11 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """Until the board is in the new terminal mode, refusals say that the mode is changing.
+    """In two situations, refusals say that the terminal mode is still changing.
 
-    There are two situations. In the first, the robot is at rest, but the driver must write its
-    settings before the mode. In the second, the driver has written the mode, but messages of the
-    normal mode still arrive.
+    In the first, the robot is at rest, but the driver must write its settings before the mode. In
+    the second, the driver has written the mode, but messages of the normal mode arrive. They show
+    that the board is not in the terminal mode.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)

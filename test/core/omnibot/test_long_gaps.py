@@ -23,8 +23,8 @@ def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -
     """The first pose that the driver publishes after a long gap is right.
 
     All frames are lost for more than 1 s. After the gap, the driver holds displacements back until
-    the board's next pose arrives, but for at most 0.2 s. So it can correct the first pose before it
-    publishes it.
+    the board's next pose arrives. Here, this takes up to 0.2 s. So the driver can correct the first
+    pose before it publishes it.
     """
     for seed in range(5):
         on = line(seed)
