@@ -49,7 +49,7 @@ class Several:
         self._retry_s = retry_s
         self._lines = [Line(opener) for opener in openers]
         self._writing = threading.Lock()
-        """Lock for the bytes that are not written yet, and for the set of open lines."""
+        """Lock that protects the bytes not yet written, and the set of open lines."""
         self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
         self._channels: dict[int, int] = {}

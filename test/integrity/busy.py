@@ -65,7 +65,7 @@ class Turns:
         self._late_s, self._steady_s, self._until_s = late_s, 0.0, 0.0
 
     def delay_s(self, random: Random, now: float) -> float:
-        """Draw the delay of the wake-up at the time ``now``, in s."""
+        """Return a random delay in s for the wake-up at the time ``now``."""
         late_s = random.expovariate(1.0 / JITTER_S)
         kind = random.random()
         if kind < BEHIND_SHARE:

@@ -96,7 +96,7 @@ def publish(name: str, lines: list[str]) -> None:
 
 
 def lines_and_events(seconds: float, seeds: int) -> None:
-    """Measure all lines and events, with a host that reads promptly."""
+    """Measure the stamps on each line, without and with events. The host reads promptly."""
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]
     cells += [

@@ -165,7 +165,7 @@ class FejemisBoard(Board):
     def silence(self) -> None:
         """Handle the silence of both boards.
 
-        Switch brush and lift off, and subscribe to all data streams again.
+        Switch off brush and lift. Subscribe to all data streams again.
         """
         self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:

@@ -104,7 +104,7 @@ Oriented = tuple[Attitude, float]
 class ImuPairs:
     """Forms pairs. A pair is a gyro line and an acceleration line of the same sample of the IMU.
 
-    Orientations are not changed. ``take`` returns pairs and orientations in order of arrival.
+    Orientations pass through. ``take`` returns pairs and orientations in order of arrival.
     """
 
     def __init__(self) -> None:

@@ -71,8 +71,10 @@ class TeensyClock:
         ``_odd``: the first of these times, and its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
-        """Board times that seem early by the present clock, each with its arrival time. Only times
-        that are plausible otherwise are stored."""
+        """Board times that seem early by the present clock, each with its arrival time.
+
+        A time is stored if it seems early by at most ``LATE_S``. All stored times agree.
+        """
         self._last_s = 0.0
         self.connect()
 

@@ -20,8 +20,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored tick reports. They usually cover five seconds, in which a clock error of 100 ppm
-adds 0.5 ms."""
+"""Number of stored tick reports. They usually cover five seconds. In this time, a clock error of
+100 ppm changes the delay by 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s. A longer delay means that the board has restarted, or that its

@@ -250,13 +250,13 @@ class Translation:
         return []
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's clock began at zero. None if it is unknown.
+        """Return the time in s since the board started, if it has just restarted. None if unknown.
 
-        The clock begins at zero when the board starts. A clock in ns also begins at zero every 4.3
-        s. For such a clock, the result is known in only one case: the clock began at zero after the
-        last tick report, and this report is less than 4.3 s old.
+        The board's clock begins at zero when the board starts. A clock in ns also wraps to zero
+        every 4.3 s. The time by such a clock is known only under two conditions: the previous
+        report is less than 4.3 s old, and the clock has begun at zero since that report.
 
-        ``duration_s``: time in s since the last tick report.
+        ``ticks``: the new report. ``duration_s``: time in s since the previous report.
         """
         if self._unit is None:
             return None

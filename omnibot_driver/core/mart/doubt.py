@@ -18,9 +18,10 @@ WAY_STDDEV: Final = 0.004
 The standard deviation grows with the square root of the distance.
 """
 GYRO_WALK: Final = 0.002
-"""Standard deviation in rad of the heading after 1 s of motion, because motion shakes the gyro.
+"""Standard deviation in rad of the heading after 1 s of motion.
 
-The standard deviation grows with the square root of the time (random walk).
+Motion shakes the gyro. So the standard deviation grows with the square root of the time (random
+walk).
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that is measured only by the right wheel."""

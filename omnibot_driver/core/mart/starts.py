@@ -98,11 +98,11 @@ class Starts(FailedStarts):
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _switch_motors_off(self, now: float) -> Packets:
-        """Return the next request that switches off the motors; no packets while it must wait.
+        """Return the next request that switches off the motors. No packets while it must wait.
 
         The requests are MCS, which writes "stop" to both motors, and MSM, which ends the effect of
-        MCS. A request waits while a late reply to another request could be mistaken for the reply
-        to it. MSM also waits while a duplicate of MCS could arrive after it.
+        MCS. Each waits until no late reply to an earlier request can be mistaken for its own reply.
+        MSM also waits until no duplicate of MCS can arrive after it.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)

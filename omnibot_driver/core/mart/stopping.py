@@ -48,9 +48,8 @@ SLOW_STOP: Final = (
 NO_START_S: Final = 0.75
 """Duration in s of a controlled turn (MCR, MCL) above which a wheel has certainly turned.
 
-If no wheel turns, the server gives up 0.6 s after the start. If a wheel turns, the server waits
-0.75 s for the robot to stop before it replies. So this reply comes later than 0.75 s after the
-start.
+If no wheel turns, the server gives up 0.6 s after the start. If a wheel turns, the server replies
+later: before its reply, it waits 0.75 s for the robot to stop.
 """
 
 
@@ -188,9 +187,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        All doubtful replies may be late replies to earlier requests if there are at most ``owed``
-        of them. Then the value is None. If there are more, the value is the last doubtful reply
-        with a plausible number. If no number is plausible, the value is the last doubtful reply.
+        Up to ``owed`` doubtful replies may be late replies to earlier requests. If no more doubtful
+        replies have come, the value is None. Otherwise, it is the last doubtful reply with a
+        plausible number. If no number is plausible, it is the last doubtful reply.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -34,8 +34,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of a frame that is assumed to have gained bytes. It applies if another header begins
-where the frame would end without these bytes."""
+"""Extra cost of assuming that a frame gained bytes although a header follows at its usual length.
+Such a header shows that the frame has probably gained no bytes."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 

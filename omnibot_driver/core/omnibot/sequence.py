@@ -166,7 +166,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if ``count`` shows that the old counter has continued."""
+        """Undo an assumed restart if ``count`` shows that the old counter has continued."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

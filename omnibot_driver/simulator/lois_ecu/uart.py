@@ -86,7 +86,7 @@ class Uart:
     def send(self, sent: bytearray) -> bool:
         """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
-        Return True if interrupts were switched on in this step. The caller must then call
+        Return True if a time with interrupts off has ended in this step. The caller must then call
         ``hear_kept``.
         """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, MOST_CREDIT)

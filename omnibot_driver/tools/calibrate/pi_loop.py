@@ -188,7 +188,8 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
     ``rpm``: the speed every 1 ms.
 
-    ``band``: allowed deviation, as a fraction of the final speed (mean of the last quarter).
+    ``band``: allowed deviation from the final speed, as a fraction of it. The final speed is the
+    mean of the last quarter of ``rpm``.
     """
     comes_to = _final_rpm(rpm)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)

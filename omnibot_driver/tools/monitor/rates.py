@@ -2,7 +2,7 @@
 
 """Measures how often messages arrive.
 
-This module must not know the messages, and does not read a clock.
+This module must not depend on the content of messages, and must not read a clock.
 """
 
 from collections import deque

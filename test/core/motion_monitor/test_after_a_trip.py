@@ -121,8 +121,8 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
     """After the first stop by the motion monitor, the driver refuses commands.
 
-    Then no command arrives for ``cmd_vel_timeout``. The driver would accept the next command, so
-    ``/diagnostics`` does not say that commands are refused.
+    The refusal ends when no command has arrived for ``cmd_vel_timeout``. From then on,
+    ``/diagnostics`` does not report it.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
