@@ -17,6 +17,7 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, TimeReference
 from std_msgs.msg import Float32MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 
+from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate.connection import connect
 from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.tick_records import read
@@ -157,6 +158,7 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     Then the e-stop is latched, so the driver refuses a record. The tool reports the reason.
     """
     leave_events_out(monkeypatch)
+    monkeypatch.setattr(listener, "LOST_S", 3.0)  # for a busy computer
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(
         ecu.path,
