@@ -59,8 +59,8 @@ class Board(SimulatedMart):
     def received(self) -> bytes:
         """Always empty, in place of the bytes that the board has received.
 
-        For other boards, the campaign checks that the last received bytes are a stop. The driver of
-        a MART still sends queries after its last stop. Empty bytes prevent this check.
+        For other boards, the campaign checks that the last received bytes are a stop. This check
+        must not be made for a MART, because its driver still sends queries after its last stop.
         """
         return b""
 

@@ -278,7 +278,7 @@ class FejemisBoard(Board):
     def start_requested(self) -> None:
         """Forget that the front wheel missed its angle, and cancel a requested power-off.
 
-        The driver calls this method at each call of ~/start, even during an e-stop.
+        The driver calls this method whenever it accepts a call of ~/start, even during an e-stop.
         """
         self._encoder.follower.start()
         self._upkeep.jobs.keep_power()

@@ -4,8 +4,8 @@
 
 Poses are coarse: they have steps of 1 mm. A step of 1 mm in 20 ms corresponds to 0.05 m/s. Wheel
 speeds are finer, but the motion that is summed up from them drifts away from the pose. Therefore,
-the driver computes each displacement from the wheel speeds, and corrects it towards the newest
-pose.
+the driver usually computes a displacement from the wheel speeds, and corrects it towards the newest
+pose. Without recent wheel speeds, or if they clearly contradict the pose, the pose alone decides.
 """
 
 import math
@@ -94,10 +94,10 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement from the previous pose to ``pose``, in a list.
 
-        The list is empty if there is no displacement (see the method ``pose``). Every 0.2 s, and
-        after a restart of the board, the list also contains a PoseReading. The PoseReading is the
-        sum of all displacements. The sum includes a displacement even if the driver rejects it
-        later.
+        The list is empty if there is no displacement (see the method ``pose``). The list also
+        contains a PoseReading every 0.2 s, after a restart of the board, and at the beginning of a
+        new coordinate frame. The PoseReading is the sum of all displacements. The sum includes a
+        displacement even if the driver rejects it later.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

@@ -29,8 +29,9 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""How long the driver predicts the pose after the last tick report, in periods of these reports. If
-this time is shorter than ``UNHEARD_S`` (in s), the driver predicts the pose for ``UNHEARD_S``."""
+"""How long the driver predicts the pose after the last report, in periods of the tick reports. If
+this time is shorter than ``UNHEARD_S`` (in s), the driver predicts the pose for ``UNHEARD_S``. The
+last report can also be an odometry report."""
 LOST_REPORTS_S: Final = 1.2
 """Limit in s for the duration of a silence of the board. The driver uses it to decide what happened
 in the silence. If the silence was shorter and no set-point changed in it, the driver assumes that

@@ -40,9 +40,9 @@ AFTER_MOTION_S: Final = 0.015
 commands nor settings: for example, a command for the LED. The time between two set-points is
 longer, so the driver can send a side command between them."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s after a tick report. After such a delay, the driver sends the next round of settings,
-or requests a date. It uses the delays in turn, because the board cannot receive while it sends:
-with one constant delay, every round could arrive while the board sends."""
+"""Delays in s from a tick report to the next round of settings, and from a report of any kind to a
+request for a date. The driver uses the delays in turn, because the board cannot receive while it
+sends: with one constant delay, every round could arrive while the board sends."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
@@ -235,9 +235,9 @@ class SettingsWriter:
         miss the same line in each round.
 
         The request for a date comes last. The board answers it at once, and receives nothing while
-        it sends the answer. So it would miss a setting that follows the request directly. Pauses
-        between the lines would not help, because a busy computer may write all lines of a round
-        together.
+        it sends the answer. So it would miss a setting that follows the request directly. The
+        pauses between the lines do not prevent this, because a busy computer may write all lines of
+        a round together.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order

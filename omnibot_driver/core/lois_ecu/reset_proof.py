@@ -55,7 +55,8 @@ class ResetProof:
 
         ``before``: the counts at the time of the repetition. They replace the earlier counts only
         if they can prove the reset. For this, two conditions must be true: the wheels are at rest
-        (``steady``), and the larger count is not near zero.
+        (``steady``), and the larger count reaches the limit of ``STEADY_TURNS`` and
+        ``STEADY_TICKS``.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

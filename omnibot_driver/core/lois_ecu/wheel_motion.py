@@ -109,10 +109,10 @@ class Wheel:
         self.rolled_to_m = 0.0
         """Distance in m that the wheel had rolled when its motion was last certain.
 
-        The wheel's motion is certain when a new measured speed arrives, when the controller is
-        reset, and when a command starts a wheel whose target was zero. The driver may find out
-        later that the wheel has been at rest since that time. It then subtracts the distance that
-        it has added since that time.
+        The value is set when a new measured speed arrives, when the board restarts, and when the
+        controller is reset. It is also set when a command starts a wheel whose target was zero. The
+        driver may find out later that the wheel has been at rest since that time. It then subtracts
+        the distance that it has added since that time.
         """
         self.begin_again()
 

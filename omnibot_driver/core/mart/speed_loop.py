@@ -138,8 +138,9 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors.
 
-        This is the number of units that the slower wheel needs for its speed, but at most 60. If an
-        earlier start turned no motor, the number can be larger.
+        The number of units is at least LEAST_UNITS, and at most 60. Within these limits, it is what
+        the slower wheel needs for its speed. If an earlier start turned no motor, it can be more
+        than the wheel needs.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))

@@ -32,8 +32,8 @@ TIMES: Final = 4.0
 """``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
 
 The check adds up the deltas twice, once in each frame. The error of each sum is its distance from
-the board's pose. The configured frame is wrong if two conditions are true: its error is above
-``CLEARLY_M``, and its error is above ``TIMES`` times the error in the other frame.
+the board's pose. The pose contradicts the configured frame if two conditions are true: the error
+in this frame is above ``CLEARLY_M``, and it is above ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10

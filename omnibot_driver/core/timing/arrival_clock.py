@@ -18,7 +18,8 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time, in increasing order.
 
-    If the previous read came at almost the same time, a stamp is later than the arrival time.
+    A stamp can be later than the arrival time, but only if the previous read came at almost the
+    same time.
     """
 
     skew_ppm = 0.0

@@ -28,7 +28,7 @@ Sender = object
 
 
 class Reply(NamedTuple):
-    """A datagram from ``port`` to ``sender``. ``at_s``: s since the server was constructed."""
+    """A datagram that leaves ``port`` for ``sender`` at ``at_s``, in s since construction."""
 
     at_s: float
     port: int

@@ -56,8 +56,8 @@ A larger sum means that the board missed a mark. The first time then covers two 
 marks, so it is twice as long as expected. Its relative error is 1, and so the sum is about 1. The
 board's clock can lose up to 6 ms, which makes the sum smaller.
 
-A sum below the limit can have another cause: the board noticed a mark late. Then the first time is
-too long and the second too short, so the sum is near 0.
+The board may also notice a mark late. Then the first time is too long and the second too short, so
+the sum is near 0, which is below the limit.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which no missed mark is searched for.

@@ -21,7 +21,7 @@ from omnibot_driver.tools.report.travel import SHORT_GAP_S, moving, steps
 SLIGHT_ERROR: Final = 0.03
 """Relative error of measured gravity below which the accelerometer is judged good."""
 REST_S: Final = 0.5
-"""Time in s before and after each motion for which the robot is not yet regarded as at rest."""
+"""Time in s before and after each motion for which the robot is not regarded as at rest."""
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1

@@ -129,8 +129,8 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 ) -> None:
     """The board reads no angle beyond 90°, for any sequence of angles.
 
-    The driver adds the rounding error of each angle to the next angle. Nevertheless, no sum exceeds
-    90°.
+    The driver adds the rounding error of each angle to the next angle. Nevertheless, no angle in
+    its lines exceeds 90°.
 
     The limit of 90° also holds for damaged lines. From a line with a checksum, two characters are
     lost whose loss the checksum does not detect. From a line without a checksum, one character is

@@ -112,7 +112,8 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
     """Something, such as a door sill, slows a turn for about a second. Then the turn is free again.
 
-    From then on, the robot may turn a little too fast, but not far too fast.
+    From then on, the robot may turn too fast, but its rate stays below 0.9 rad/s if 0.5 rad/s is
+    commanded. If the driver has learned from an earlier turn, it stays below 0.6 rad/s.
     """
     bench = MartBench("source").ready()
     if learned:
@@ -157,7 +158,7 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
     """Slow turns on the spot are up to 17 % faster than commanded: motor units are whole numbers.
 
-    The driver does not blame the motors. It keeps the balance that it learned from a drive.
+    These turns do not change the balance of the motors that the driver has learned from a drive.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):

@@ -163,8 +163,7 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
     """The robot rolls out while the board is paused. After the pause, odom includes this motion.
 
-    The board reports the motion without its duration. So the first twist after the pause is
-    unknown.
+    The duration of this motion is unknown. So the first twist after the pause is unknown, too.
     """
     bench.drive(0.5)
     bench.run(0.4)

@@ -113,9 +113,10 @@ def test_duties_are_commanded_in_duty_mode_and_one_that_waited_is_refused(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A user sets a terminal mode. Its topic appears.
+    """A user sets the terminal mode "gps". The board's lines appear on the topic ~/terminal.
 
-    Then the user sets a drive mode, while the driver runs. The topic of this mode appears, too.
+    Then the user sets the terminal mode "host" again, and the drive mode "duty". The driver obeys
+    the topic ``duty_cmd`` of this drive mode without a restart.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
