@@ -76,7 +76,8 @@ class ReadingClock(Protocol):
     ) -> list[float]:
         """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
-        ``now``: the time that was passed to this call. ``edge``: ``Board.edge`` after it.
+        ``now``: the time that was passed to this call. ``edge``: the value of ``Board.edge`` after
+        this call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:

@@ -69,10 +69,10 @@ motion."""
 class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
-      does not count them again.
-    * ``restarted``: whether the board's counter of poses begins anew with this pose. Then the
-      board's counter of displacements began anew before this pose.
+    * ``lost``: number of lost displacements whose motion this pose includes. ``lost`` of the next
+      DisplacementReading does not include them.
+    * ``restarted``: whether the counter of this pose shows that the board has restarted. The
+      displacements before this pose did not show it.
     """
 
     x_m: float

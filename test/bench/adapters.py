@@ -14,9 +14,10 @@ LARGEST_PIECE: Final = 16
 PACKET: Final = 62
 """Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""Real period of the adapter's timer by the board's clock, divided by its nominal period.
+"""Real period of the adapter's timer, divided by its nominal period.
 
-Because the two periods differ, the packets end at all phases of the board's tick within 10 s.
+The board's clock measures the real period. So the timer drifts against the board's tick: within
+10 s, packets have ended at every position in the tick.
 """
 
 Handed = tuple[float, bytes]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The limits of the integrity report, and the streams whose results are compared with them.
+"""The limits for the errors of a parser, and the streams on which the report checks them.
 
 A *chunking* is a way in which the computer reads a stream in pieces. The *plain* parser decodes
 without checks, for comparison with the driver's parser.

@@ -250,11 +250,12 @@ class Translation:
         return []
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board started, if it has just restarted. None if unknown.
+        """Return the time in s since the board's start, assumed to be after the previous report.
 
-        The board's clock begins at zero when the board starts. A clock in ns also wraps to zero
-        every 4.3 s. The time by such a clock is known only under two conditions: the previous
-        report is less than 4.3 s old, and the clock has begun at zero since that report.
+        The board's clock begins at zero at the start, so this time is the clock's value. The result
+        is None if the clock's unit is unknown. A clock in ns also wraps to zero every 4.3 s. Then
+        the result is None unless the previous report is less than 4.3 s old, and the clock's value
+        is at most this age.
 
         ``ticks``: the new report. ``duration_s``: time in s since the previous report.
         """

@@ -228,8 +228,8 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
     """The board loses power while it sends a line of text, so only a part of the line arrives.
 
-    The notice to the user says that no data arrives. It does not say that the baud rate may be
-    wrong, although the part of a line is no valid data.
+    A part of a line is not valid data. But the notice to the user says "no data", not "no valid
+    data".
     """
     bench = Bench("firmware")
     while not bench.board._uart.sending:

@@ -32,7 +32,7 @@ RECORD = (
     b"Gyro bias (deg/sec): 0.000\n"
     b"Max speed: 20\n"
 )
-"""The beginning of a file of the public server, for a turn to the right."""
+"""The first lines of the record that the public server writes about a turn to the right."""
 LONGEST_REPLY = 100
 GOALS = [(1.0, 1.0, 3.0), (-1.0, 0.5, -2.0), (0.5, -1.0, 1.5), (0.0, 0.0, 0.0)]
 

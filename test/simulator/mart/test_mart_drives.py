@@ -171,7 +171,7 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """The speed changes CS and RMCS have two numbers: first for the right motor, then for the left.
+    """CS and RMCS change the speed. They have two numbers: for the right motor, then for the left.
 
     A positive number makes a motor turn more forward, also in the backward drive B.
     """
