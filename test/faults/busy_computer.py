@@ -168,5 +168,6 @@ def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
         )
     rig.findings.expect(not rig.terminal.dropped, f"the kernel lost {rig.terminal.dropped} bytes")
     blamed = [text for text in rig.driver.lines[line:] if "cable" in text]
-    punctual = rig.terminal.silent_s < SILENCE_S
+    # The driver itself may read late too, and adds this to the pause of the terminal.
+    punctual = rig.terminal.silent_s < SILENCE_S / 2
     rig.findings.expect(not (blamed and punctual), f"the line is blamed: {blamed}")
