@@ -9,6 +9,7 @@ from any_board import AnyBench, LoisRobot
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Extra
 from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
@@ -78,3 +79,12 @@ def configure(bench: Bench, settings: LoisEcuSettings) -> None:
     """Change the session's board settings, as the node does when parameters change."""
     bench.session.configure(SETTINGS, bench.now, board=settings)
     bench.settle()
+
+
+def refusal(bench: Bench, vx: float = 0.3) -> str:
+    """Return why the driver refuses a motion command; empty if it accepts the command."""
+    try:
+        bench.drive(vx)
+    except CommandRefused as refused:
+        return str(refused).removeprefix("motion command refused: ")
+    return ""

@@ -1,0 +1,66 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Changes of the drive mode and of the duty scale of a LOIS ECU, during a drive.
+
+Before such a change, the driver stops the robot and refuses motion.
+"""
+
+import pytest
+from lois_bench import FIRMWARE, Bench, configure, refusal
+
+from omnibot_driver.core.errors import CommandRefused
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+
+@pytest.mark.slow
+@FIRMWARE
+def test_another_drive_mode_stops_first(firmware: str) -> None:
+    """The user sets another drive mode while the robot drives.
+
+    The driver stops the robot, and refuses motion until the robot rests.
+    """
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty"))
+    with pytest.raises(CommandRefused, match="drive_mode is changing to duty"):
+        bench.drive()
+    bench.run_until(lambda: bench.robot.stands)
+    with pytest.raises(CommandRefused, match="wait"):
+        bench.drive()
+    bench.run(1.0)
+    bench.drive_on(0.3, 2.0)
+    assert bench.board.commands[-1].command == 0x01
+    assert not bench.robot.stands
+
+
+@pytest.mark.slow
+@FIRMWARE
+def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
+    """Odometry shows backward motion by duty after a forward drive.
+
+    The user sets duty mode in a forward drive, then drives backward. After a Stop, the public
+    firmware still has the RPM target of the forward drive. While this target is positive, the
+    firmware counts all ticks as forward. So the driver clears the target before it drives by duty.
+    """
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty"))
+    bench.run_until(lambda: refusal(bench, -0.3) == "")
+    before_m, before = bench.robot.way_m, bench.odometry[-1].pose
+    bench.drive_on(-0.3, 1.5)
+    assert bench.robot.way_m < before_m - 0.1
+    assert before.way_to(bench.odometry[-1].pose).x_m < -0.1
+    assert not [notice for notice in bench.notices if "motion monitor" in notice]
+
+
+def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
+    """The robot is driven by duties, which depend on the duty scale. The user changes this scale.
+
+    The driver stops the robot first.
+    """
+    bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty", duty_scale=500.0))
+    with pytest.raises(CommandRefused, match="duty_scale is changing to 500"):
+        bench.drive()
+    bench.run_until(lambda: bench.robot.stands)
