@@ -298,6 +298,7 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     [
         (steady(0.06), Drift(0.09, 0.0, 0.0, 0.06, 0.12)),  # the second command came late
         (Drift(0.03, 0.0, 0.0, 0.01, 0.06), steady(0.12)),  # the first command came late
+        (steady(0.06), Drift(0.08, 0.0, 0.0, 0.12, 0.04)),  # the robot was stopped too early
         (steady(0.06), steady(0.2)),
     ],
 )

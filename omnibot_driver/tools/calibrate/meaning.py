@@ -100,8 +100,13 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
     # In velocity control the speed is constant, and doubles with the command. In positional control
     # the command is a position a few mm from the origin of the board's frame. The robot has stopped
     # there, or still drives there at a speed that does not depend on the command.
+    # A speed that doubled and then fell shows a lost command, not a goal.
     both = slow, fast
-    if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):
+    moved = slow.early_mps > STANDS_PART * slow_mps
+    doubled = moved and DOUBLED[0] < fast.early_mps / slow.early_mps < DOUBLED[1]
+    if not doubled and any(
+        one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both
+    ):
         return "position"
     if any(abs(one.late_mps - one.early_mps) >= STEADY_PART * one.early_mps for one in both):
         return None
