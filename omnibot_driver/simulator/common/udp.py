@@ -80,6 +80,8 @@ def _in_a_row(count: int, port: int) -> list[UdpSocket]:
     with contextlib.ExitStack() as opened:
         sockets = []
         for _ in range(count):
+            if port > LARGEST:  # the system chose the highest port for the first channel
+                raise OSError(errno.EADDRINUSE, "no higher port")
             one = opened.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
             one.bind((HOST, port))
             sockets.append(one)

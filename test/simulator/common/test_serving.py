@@ -7,6 +7,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from toy_lines import DRIVE, FRONT, ToyLines
@@ -14,7 +15,7 @@ from toy_udp import ToyServer
 
 from omnibot_driver.simulator.common.board import Channel
 from omnibot_driver.simulator.common.serving import ServedBoard, open_carriers
-from omnibot_driver.simulator.common.udp import open_sockets
+from omnibot_driver.simulator.common.udp import LARGEST, open_sockets
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -148,6 +149,25 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
     for one in carriers:
         one.close()
     assert [place(one.address) for one in carriers] == [first, second]
+
+
+def test_a_first_port_that_has_no_next_port_is_chosen_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The system chooses the highest port for the first channel. The simulator tries again."""
+    choices = iter([LARGEST])
+
+    class Socket(socket.socket):
+        def bind(self, address: Any) -> None:
+            host, port = address
+            super().bind((host, port or next(choices, 0)))
+
+    monkeypatch.setattr(socket, "socket", Socket)
+    sockets = open_sockets(2)
+    first, second = (place(one.address)[1] for one in sockets)
+    for one in sockets:
+        one.close()
+    assert second == first + 1 <= LARGEST
 
 
 def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
