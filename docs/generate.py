@@ -11,8 +11,6 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-import mode_diagram
-
 from omnibot_driver import boards
 from omnibot_driver.core.board import Mode
 from omnibot_driver.core.omnibot.modes import TRANSITIONS
@@ -128,7 +126,6 @@ GENERATED: Final[dict[str, Callable[[], str]]] = {
     "config/driver.yaml": partial(parameter_file, "omnibot"),  # former name, kept for one release
     "docs/internals/architecture.md": architecture,
     "docs/parameters.md": parameters_page,
-    "docs/pictures/modes.svg": mode_diagram.svg,
 }
 
 
