@@ -47,8 +47,10 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     listener.wait_for(lambda: any("while writing" in str(text) for text in listener.reports))
     heard = terminal.read_until(2 * STOP + START)
     link.close("stop")
-    # The link may have repeated Stop while the test filled the port.
-    assert heard.rpartition(b"x")[2].startswith(2 * STOP + START)
+    last = heard.rpartition(b"x")[2]
+    assert last.startswith(2 * STOP)
+    # On a busy computer, the guard may also have written Stop.
+    assert last.replace(STOP, b"").startswith(START)
 
 
 def at_rest(terminal: Terminal) -> tuple[Link, Session]:

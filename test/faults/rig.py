@@ -23,7 +23,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from driver_process import PATIENCE_S, Driver
 from nav_msgs.msg import Odometry
 from ports import Terminal
-from probe import ANSWER_LOST, Probe
+from probe import Probe
 from published import stamp_s
 from rig_board import RigBoard
 from sensor_msgs.msg import Imu
@@ -124,8 +124,7 @@ class Rig:
         self.driver = self._stack.enter_context(
             Driver(before=self._before, **self.ports, **self._parameters)
         )
-        self.probe = self._stack.enter_context(Probe(self.driver.namespace))
-        self.driver.answers[ANSWER_LOST] = self.probe.call_again
+        self.probe = self._stack.enter_context(Probe.of(self.driver))
         self.imu = self.probe.listen(Imu, "imu/data_raw") if self.kind.imu else []
         self.odom = self.probe.listen(Odometry, "odom")
         self.states = self.probe.listen(String, "omnibot_driver/state", latched=True)

@@ -38,7 +38,7 @@ def main(folder: Path) -> None:
     with ExitStack() as stack:
         stack.callback(rclpy.shutdown)
         driver = stack.enter_context(Driver(port="sim://?seed=1"))
-        probe = stack.enter_context(Probe(driver.namespace))
+        probe = stack.enter_context(Probe.of(driver))
         bag = Path(stack.enter_context(tempfile.TemporaryDirectory())) / "square"
         probe.wait_for_state("nominal")
         recorder = Recorder(probe)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from driver_process import PATIENCE_S, Driver
-from probe import ANSWER_LOST, Probe, ros
+from probe import Probe, ros
 from std_srvs.srv import SetBool
 
 from omnibot_driver.shared_session import WAITED
@@ -62,9 +62,8 @@ def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """
 
     def start(driver: Driver) -> Probe:
-        probe = stack.enter_context(Probe(driver.namespace))
+        probe = stack.enter_context(Probe.of(driver))
         driver.answers[WAITED] = driver.answers[UNHEARD] = probe.publish_again
-        driver.answers[ANSWER_LOST] = probe.call_again
         return probe
 
     return start

@@ -102,7 +102,7 @@ def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float 
     with ExitStack() as stack:
         port = stack.enter_context(PtyBoard(board, line=line))
         driver = stack.enter_context(Driver(port=port.path))
-        probe = stack.enter_context(Probe(driver.namespace))
+        probe = stack.enter_context(Probe.of(driver))
         imu, odom = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
         try:
             probe.wait_for_state("nominal")

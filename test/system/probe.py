@@ -9,7 +9,7 @@ from functools import partial, partialmethod
 from typing import TYPE_CHECKING, Any, Self
 
 import rclpy
-from driver_process import PATIENCE_S
+from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
@@ -81,6 +81,13 @@ class Probe:
         self._spinner = threading.Thread(
             target=self._executor.spin_until_future_complete, args=(self._stopping,)
         )
+
+    @classmethod
+    def of(cls, driver: Driver) -> Self:
+        """Return a probe of a driver. If an answer to it is lost, it calls the service again."""
+        probe = cls(driver.namespace)
+        driver.answers[ANSWER_LOST] = probe.call_again
+        return probe
 
     def __enter__(self) -> Self:
         self._spinner.start()

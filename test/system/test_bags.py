@@ -42,7 +42,7 @@ class Drive:
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
     with ExitStack() as stack:
         driver = stack.enter_context(Driver(port="sim://?seed=1", publish_raw="true"))
-        probe = stack.enter_context(Probe(driver.namespace))
+        probe = stack.enter_context(Probe.of(driver))
         probe.wait_for_state("nominal")
         recorder = Recorder(probe)
         recorder.record(*MEASURED, *RAW)
@@ -152,7 +152,7 @@ def replay(stack: ExitStack, drive: Drive) -> tuple[Driver, Probe, dict[str, lis
     Return the driver, its probe, and the messages by topic.
     """
     driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=7"))
-    probe = stack.enter_context(Probe(driver.namespace))
+    probe = stack.enter_context(Probe.of(driver))
     heard = {}
     for topic, kind in MEASURED.items():
         qos = as_played(drive.recorder.offered[f"/{drive.namespace}/{topic}"])

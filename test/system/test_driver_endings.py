@@ -262,7 +262,8 @@ def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Sta
             bad.linear.x = float("nan")
             probe.publisher(Twist, "cmd_vel").publish(bad)
             assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
-            assert probe.call(SetBool, "estop", data=True).success
+            probe.call_async(SetBool, "estop", data=True)
+            assert board.wait_for(lambda b: any(c.kind == "estop" for c in b.commands), PATIENCE_S)
         process.send_signal(signal.SIGTERM)
         assert process.wait(PATIENCE_S) == 0
     finally:

@@ -48,7 +48,7 @@ class Robot:
                 use_sim_time=False,
             )
         )
-        self.probe = stack.enter_context(Probe(self.driver.namespace))
+        self.probe = stack.enter_context(Probe.of(self.driver))
         self.probe.wait_for_state("nominal")
         self.reports = self.probe.listen(DiagnosticArray, "/diagnostics")
 

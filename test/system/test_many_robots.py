@@ -51,7 +51,7 @@ def fleet() -> Iterator[list[Robot]]:
                     **{name: f"r{seed}/{name}" for name in names},
                 )
             )
-            probe = stack.enter_context(Probe(driver.namespace))
+            probe = stack.enter_context(Probe.of(driver))
             robots.append(
                 Robot(
                     driver.namespace,

@@ -23,18 +23,25 @@ from omnibot_driver.transports.several import Several
 
 
 class Ends:
-    """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends."""
+    """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends.
 
-    def __init__(self) -> None:
+    ``paths`` are links to the driver's ends. The link of a lost line is removed, because another
+    program may get a terminal of the same name.
+    """
+
+    def __init__(self, folder: Path) -> None:
         self.far, self.near, self.paths = [], [], []
-        for _ in range(2):
+        for number in range(2):
             far, near = os.openpty()
             tty.setraw(near)
             self.far.append(far)
             self.near.append(near)
-            self.paths.append(os.ttyname(near))
+            link = folder / str(number)
+            link.symlink_to(os.ttyname(near))
+            self.paths.append(str(link))
 
     def hang_up(self, number: int) -> None:
+        Path(self.paths[number]).unlink(missing_ok=True)
         for ends in (self.far, self.near):
             if ends[number] >= 0:
                 os.close(ends[number])
@@ -46,8 +53,8 @@ class Ends:
 
 
 @pytest.fixture
-def ends() -> Iterator[Ends]:
-    ends = Ends()
+def ends(tmp_path: Path) -> Iterator[Ends]:
+    ends = Ends(tmp_path)
     yield ends
     ends.close()
 

@@ -33,7 +33,7 @@ def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
     """A drive is recorded and replayed. The replay ends at the same place in odom, within 1 cm."""
     with ExitStack() as stack:
         driver = stack.enter_context(Driver(port="sim://", board="fejemis", publish_raw="true"))
-        probe = stack.enter_context(Probe(driver.namespace))
+        probe = stack.enter_context(Probe.of(driver))
         recorder = Recorder(probe)
         recorder.record(*RAW)
         odometry = probe.listen(Odometry, "odom")
@@ -53,7 +53,7 @@ def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
     with ExitStack() as stack:
         port = f"replay://{bag}?speed=5&delay=5"
         again = stack.enter_context(Driver(port=port, board="fejemis"))
-        listener = stack.enter_context(Probe(again.namespace))
+        listener = stack.enter_context(Probe.of(again))
         heard = listener.listen(Odometry, "odom")
         again.wait_for_line("the recording has ended")
         ends_there = listener.comes_about(
