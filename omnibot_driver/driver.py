@@ -123,7 +123,7 @@ def in_plain_words(text: str) -> str:
 
 
 def too_large(domain: str) -> bool:
-    """Return whether Fast DDS would end the process silently, because this domain is too large."""
+    """Return whether this ROS domain is so large that Fast DDS would silently end the process."""
     return domain.isdecimal() and int(domain) > LARGEST_DOMAIN
 
 

@@ -32,7 +32,8 @@ class Outbox:
     def put(self, delivery: Delivery) -> None:
         """Append a call, without waiting.
 
-        The caller must hold the lock under which the event occurred.
+        The caller must hold the lock under which the event occurred. So the calls have the order of
+        the events.
         """
         self._waiting.append(delivery)
 

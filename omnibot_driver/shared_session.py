@@ -60,13 +60,14 @@ class SharedSession:
         self.told = False
         """Whether the link wrote its last Stop to every line.
 
-        The port may be lost while the link ends. Then the reader opens it again and writes Stop. In
-        this case, ``told`` becomes True only if no standstill was proved before (``Shutdown.owed``
-        is True).
+        The port may be lost while the link ends. Then the reader opens it again and writes Stop.
+        After this Stop, ``told`` becomes True only if the robot was not yet proved to stand still
+        (``Shutdown.owed``).
         """
         self.stood = False
-        """Whether, at the end of the link, Stop was sent and measurements had shown the robot at
-        rest. No motion was commanded since these measurements."""
+        """Whether the robot was known to stand still when the link ended. Three conditions must be
+        true: Stop was written to every line, measurements had shown the robot at rest, and no
+        motion was commanded after these measurements."""
         self.closing = threading.Event()
         """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write
@@ -100,14 +101,15 @@ class SharedSession:
         """Call ``action`` with the session and ``wish``, the motion that a sender commands.
 
         * ``sent_ns``: times at which the sender may have sent the command, as time of day in ns.
-          There are two such times while the sender's clock is not known well.
+          There are two times if the offset of the sender's clock is not known well, and none for a
+          command to stop.
         * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
           the motion interlock must know that the sender is still active.
 
         Raises CommandRefused if ``action`` refuses the command. Also raises CommandRefused if the
-        command was sent while this process was stalled. In both cases, the function ``refused`` is
-        called with the reason. There is one exception: if too many events wait for delivery,
-        ``refused`` is not called.
+        command may have been sent before or during a recent stall of this process. In both cases,
+        the function ``refused`` is called with the reason. There is one exception: if too many
+        events wait for delivery, ``refused`` is not called.
         """
         try:
             with self.lock:

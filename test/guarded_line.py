@@ -79,7 +79,7 @@ def children() -> list[int]:
 
 
 def started(pid: int) -> None:
-    """Wait until the guard process ignores SIGTERM. Then the guard's program runs."""
+    """Wait until the program of the guard process runs: it then ignores SIGTERM."""
     end = time.monotonic() + PATIENCE_S
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:

@@ -169,7 +169,10 @@ class SafetyStops:
             self._mode_manager.heard_nothing(now)
 
     def stalled(self, seconds: float, now: float) -> None:
-        """Stop the robot, because this process was stalled for ``seconds``. A long task fails."""
+        """Stop the robot, because this process was stalled for ``seconds``.
+
+        A long task that is in progress ends as failed.
+        """
         self._liveness.stalled(now)
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()

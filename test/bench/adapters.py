@@ -16,8 +16,8 @@ PACKET: Final = 62
 DRIFT: Final = 1.0002
 """Real period of the adapter's timer, divided by its nominal period.
 
-The board's clock measures the real period. So the timer drifts against the board's tick: within
-10 s, packets have ended at every position in the tick.
+With the nominal period, packets would end at only a few positions in the board's tick. With the
+real one, the timer drifts: within 10 s, packets have ended at every position in the tick.
 """
 
 Handed = tuple[float, bytes]

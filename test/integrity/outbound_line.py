@@ -14,11 +14,11 @@ ADDED: Final = -1
 CHANGED: Final = -2
 
 Arrival = tuple[int, float, int]
-"""A byte that arrives: its value, its position in the write, and its origin.
+"""A byte that arrives: its value, its place, and its origin.
 
-The origin shows where the byte comes from. For a byte that the driver wrote, it is the position of
-the byte. Otherwise, it is ``ADDED`` or ``CHANGED``. The position of an added byte is a number
-between the positions of two written bytes.
+The place is the position of the byte in the write. An added byte has a place between the positions
+of two written bytes, such as 3.5. The origin of an undamaged byte is its position in the write. The
+origin of any other byte is ``ADDED`` or ``CHANGED``.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 
@@ -27,8 +27,8 @@ class Line(Protocol):
     """The damaged line of one trial.
 
     ``whole``: number of bytes before the next fault. A write of at most this length arrives
-    undamaged. For such a write, the caller need not call ``carry``. It subtracts the write's length
-    from ``whole``. For a longer write, the caller must call ``carry``.
+    undamaged. For such a write, the caller may subtract the length from ``whole`` and not call
+    ``carry``. For a longer write, the caller must call ``carry``.
     """
 
     whole: int

@@ -223,10 +223,10 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
 def test_the_parameter_file_is_that_of_the_board(
     launch: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """The argument ``board`` selects the parameter file.
+    """The argument ``board`` selects the board's parameter file.
 
-    If the user does not give this argument, the user's own parameter file may set the parameter
-    ``board``. Then the driver uses the board of that file.
+    Without this argument, the user's own parameter file can select the board, if it contains the
+    parameter ``board``.
     """
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults

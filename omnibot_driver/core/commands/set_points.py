@@ -133,7 +133,7 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """Return the order, which does not change."""
+        """Return the order, which is the same at all times."""
         return self._order
 
     def check_anew(self) -> None:
@@ -175,7 +175,7 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """Return the order, which does not change."""
+        """Return the order, which is the same at all times."""
         return self._order
 
     def check_anew(self) -> None:
@@ -183,7 +183,7 @@ class GoalSetpoint:
         self._check(self._order)
 
     def is_left_by(self, pose: Pose) -> bool:
-        """Return whether ``pose`` is clearly farther from the goal than the nearest earlier pose.
+        """Return whether ``pose`` is clearly farther from the goal than an earlier pose was.
 
         The result is always False if the board does not drive straight to the goal.
         """

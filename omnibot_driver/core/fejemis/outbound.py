@@ -30,10 +30,10 @@ def lines(*texts: bytes, sums: bool) -> bytes:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum of ``text`` detects a loss of two particular characters.
+    """Return whether the checksum of ``text`` detects each critical loss of two characters.
 
-    The first of the two is a line end or a digit of the checksum. The second is ``;`` or part of a
-    number.
+    A loss is critical if one of the two characters is a line end or a digit of the checksum, and
+    the other is ``;`` or part of a number.
     """
     # A lost line end joins two lines. Let S be the sum of the second line with its prefix ``;NN``.
     # The board accepts the joined line if a character with the code S is lost too. So S must not be

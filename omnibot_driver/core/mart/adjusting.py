@@ -72,7 +72,7 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Pass the expected ratio of wheel speeds (left / right) to the odometry, or None.
+        """Set the ratio of wheel speeds (left / right) that the odometry expects.
 
         The odometry computes the robot's turn from this ratio in two cases: in a turn on the spot,
         and in a backward drive (B) whose heading the server does not report. In all other cases,

@@ -49,8 +49,8 @@ TRAITS: Final = Traits(
     },
 )
 ANSWERED: Final = NoticeReading("", halt=False)
-"""A reading without effect, which only shows that the server answers. NOTHING_MEASURED has an
-effect: it makes the motion monitor forget its earlier measurements. So it is not used here."""
+"""A reading that only shows that the server answers, and has no other effect. NOTHING_MEASURED
+cannot replace it, because it makes the motion monitor forget its earlier measurements."""
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
 FARTHEST_M: Final = 1000.0
@@ -126,7 +126,7 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that follow from a datagram of this channel.
 
-        Once the mode is nominal, a reply from which no other reading follows gives the reading
+        Once the mode is nominal, each reply gives at least one reading. If there is no other, it is
         ANSWERED.
         """
         if channel == words.COMMAND:
@@ -231,11 +231,10 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server reports a heading of exactly zero. It does so before its first RM.
+        """Whether the server's heading is exactly zero, as before its first RM (forward drive).
 
-        RM is the forward drive. After the first RM, the server's clock must not be set back.
-        Otherwise the next RM would report a wrong heading, because RM integrates the turn rate over
-        the time since the previous RM.
+        The server's clock may be set back only before the first RM. RM integrates the turn rate
+        over the time since the previous RM, so it would report a wrong heading after such a change.
         """
         return self._pilot.odometry.heading.is_zero
 
@@ -288,7 +287,7 @@ class Conductor:
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Do nothing, because only the pilot sends requests to this board."""
+        """Do nothing: all these packets come from the pilot, which has recorded them itself."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now."""

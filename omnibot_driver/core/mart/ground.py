@@ -40,7 +40,7 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Shortest time in s from the first reply of a server that was absent to the start of a motion.
+"""Least time in s between the server's first reply after an absence and the start of a motion.
 
 The server may just have been started. While it starts up, VOLTS and most motion commands crash it.
 If RM (forward drive) crashes it, the motors stay on after the crash.
@@ -74,7 +74,8 @@ a server whose stop port hangs."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
-During the move, a server does not answer HELLO. An answer therefore shows that it was restarted.
+A server that executes the move does not answer HELLO. So if it answers, the move is over and its
+reply was lost, or the server was restarted.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
@@ -130,7 +131,7 @@ class Ground:
         self.conversation.delay_s = settings.network_delay_s
 
     def connect(self) -> None:
-        """Begin a new connection. The state is unknown, because the robot may be moving."""
+        """Begin a new connection. The robot may be moving, so its state is unknown."""
         self.conversation.connect()
         self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
         self.jobs.forget_log()
@@ -279,10 +280,9 @@ class Ground:
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        The driver must wait only after a forward drive (RM). In the odometry, the first encoder
-        count at rest ends this drive. When the drive ends, the odometry needs a heading that was
-        measured at rest. Therefore, the driver must receive this heading before it reads the
-        encoder.
+        This is necessary only after a forward drive (RM). The odometry ends this drive with the
+        first encoder count at rest. At that time, it must already have a heading that was measured
+        at rest.
 
         The driver waits for at most HEADING_S (s), plus HEADING_TRIPS times the duration of a
         query. If no heading has come by then, it logs NO_HEADING once.

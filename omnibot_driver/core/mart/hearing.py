@@ -20,12 +20,12 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units for which the driver does not need a reply from the
-server.
+"""Largest relative change of the motors' units after which a missing reply does not stop the robot.
 
-The limit applies to a backward drive (B) in which the server reports no headings. If the server
-does not answer a change above the limit, the driver does not know how the robot turns. So it
-stops the robot.
+This applies to a backward drive (B) in which the server reports no headings. The driver then
+computes the robot's turn from the motors' units. If the reply to a change is missing, the driver
+does not know which units apply. After a small change, the turn is still known well enough. After a
+larger change it is not, so the driver stops the robot.
 """
 
 

@@ -136,8 +136,8 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job. It replaces a job that the driver itself began and has not sent yet.
 
-        Raises RequestRefused while another job is in progress. Also raises RequestRefused if the
-        log is to be downloaded, but the server may have no log.
+        Raises RequestRefused in two cases: another job is in progress, or the log is requested
+        although the server may have no log.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -224,7 +224,11 @@ class Jobs:
             )
 
     def piece(self, data: bytes, now: float) -> None:
-        """Keep a datagram as a piece of the file if it is as long as a full or the last piece."""
+        """Keep a datagram as a piece of the file.
+
+        A datagram is ignored if it has neither the length of a full piece nor that of the last
+        piece.
+        """
         if data and len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
             complete = len(self._pieces) * PIECE >= self._size

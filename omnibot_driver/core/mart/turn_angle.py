@@ -21,8 +21,8 @@ class TurnAngle:
 
     Some methods return a correction in rad, which the caller adds to the heading of the pose.
 
-    ``spun_rad``: the turn that the wheel has measured. When ``record`` accepts an angle, the
-    accepted angle replaces the measured turn.
+    ``spun_rad``: the turn that the wheel has measured. When ``record`` accepts a recorded angle,
+    ``spun_rad`` becomes this angle.
     """
 
     def __init__(self) -> None:
@@ -87,7 +87,7 @@ class TurnAngle:
 
 
 def is_of_another(wrong_rad: float, spun_rad: float) -> bool:
-    """Return whether a reported angle must be the angle of another motion.
+    """Return whether a reported angle belongs to another motion, not to this turn.
 
     This is the case if the reported angle differs too much from the turn that the wheel measured.
 

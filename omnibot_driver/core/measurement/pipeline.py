@@ -53,8 +53,8 @@ class MeasurementPipeline:
             settings.motion, period_s or 0.0, corrected=board.traits.own_odometry
         )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
-        """Reads whose readings are not counted yet. Each is a pair: the readings of the read, and
-        the age in s that the newest of these readings had on arrival."""
+        """Reads whose readings are not counted yet. Each entry has the readings of one read, and
+        the age in s that the newest of them had on arrival."""
         self.undigested: list[Stamped] = []
         """Stamped readings that wait for ``flush``."""
 
@@ -121,7 +121,7 @@ class MeasurementPipeline:
         return self._tally
 
     def flush(self) -> list[Measured]:
-        """Return the measurements from the readings that waited for this call."""
+        """Return the measurements from the readings that ``hear`` has not processed."""
         measured: list[Measured] = []
         for reading, stamp_s in self.undigested:
             for sure, at_s in self._outliers.admit(reading, stamp_s):

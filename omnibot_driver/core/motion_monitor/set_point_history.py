@@ -33,8 +33,8 @@ FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored. By then, it allows less than 2 % of its
 velocity."""
 UNKNOWN_S: Final = 0.8
-"""Time in s for which unknown commands may still move the robot. It begins with the first known
-set-point. The unknown commands are those from before this set-point."""
+"""Time in s, from the first known set-point on, for which the robot may still move because of
+unknown earlier commands."""
 HISTORY_S: Final = 3.0
 """Length of the history in s. A displacement can be older than the history only if the computer has
 stalled."""

@@ -182,10 +182,7 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """Accept consecutive frames until a frame is uncertain.
-
-        Return False if there is such a frame.
-        """
+        """Accept consecutive frames. If a frame is uncertain, stop there and return False."""
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
@@ -227,7 +224,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether the arrival times allow that the last byte held begins another frame.
+        """Return whether the last byte held may begin another frame, judged by the arrival times.
 
         ``start``, ``length``: position and length of the last frame held. ``due``: whether another
         frame may follow this frame directly.
@@ -248,8 +245,8 @@ class FrameDecoder:
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept the frames of ``walk`` except the last two.
 
-        The bytes after these two frames are odd, so the two frames are uncertain. Always return
-        False: ``_walk`` returns this value to report an uncertain frame.
+        The data after these frames are odd, so the last two frames are uncertain. Always return
+        False, which is the result of ``_walk`` if a frame is uncertain.
         """
         believed = len(walk.frames) - 2
         if believed > 0:
@@ -306,8 +303,8 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
-        A frame is decided in two cases: later bytes cannot change the decision, or the frame ends
-        at the position ``until`` or before.
+        A frame is decided if later bytes cannot change the decision. A frame that ends at the
+        position ``until`` or before is decided in any case.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

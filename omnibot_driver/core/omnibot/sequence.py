@@ -17,11 +17,15 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Limit, in s, for the difference between the elapsed time and the time shown by a counter.
+"""Limit, in s, for the difference between two measures of the time from one delta to the next.
 
-If the difference is larger, the board may have restarted. The limit is larger for a longer elapsed
-time, because the board's clock drifts (``DRIFT``). Arrival times are wrong by 0.24 s at most, if
-the host's buffer is full and every tenth byte is lost. So this error does not exceed the limit.
+One measure is the elapsed time, which is the difference of the arrival times. The other is the
+difference of the counters times the period. If they differ by more than the limit, the board may
+have restarted. The limit is larger for a longer elapsed time, because the board's clock drifts
+(``DRIFT``).
+
+An arrival time can be wrong by up to 0.24 s, if the host's buffer is full and every tenth byte is
+lost. The limit is larger than this error, so the error alone does not look like a restart.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and of times that are computed from its counters.
@@ -30,15 +34,16 @@ After minutes of silence, this error is so large that the counter cannot show a 
 board's pose can then prove a restart.
 """
 EARLY_S: Final = 0.2
-"""Largest time in s by which a counter after a restart may be ahead of the elapsed time.
+"""Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-The elapsed time begins when the driver reads the last delta before the restart. It includes the
-duration of the restart, which is longer than ``EARLY_S``. So it is usually longer than the time
-that the counter shows. It is shorter only if the driver read the last delta very late.
+After a restart, the counter shows the time since the restart. The elapsed time is longer: it begins
+when the driver reads the last delta before the restart, and includes the duration of the restart.
+This duration is longer than ``EARLY_S``. The elapsed time is shorter only if the driver read the
+last delta very late. The tolerance allows for this case.
 """
 LONG_GAP_S: Final = 1.0
-"""Duration of lost deltas, in s, above which the next pose cannot show a restart: the last delta is
-then too old to be compared with it."""
+"""A pose does not show a restart if deltas of more than this duration, in s, are missing before it.
+The pose is compared with the last delta, which is then too old."""
 
 
 @value(frozen=True, slots=True)
@@ -81,8 +86,8 @@ class Sequence:
         number of lost deltas is computed from the elapsed time.
         """
         self._left: tuple[int, float, int] | None = None
-        """The supposed restart, to withdraw it later: the last counter before it, the arrival time
-        of that counter in s, and the first counter after it."""
+        """What is needed to withdraw a supposed restart: the last counter before it, the arrival
+        time of this counter in s, and the first counter after the restart."""
 
     def pause(self) -> None:
         """Record that the board paused. Its counters may then continue, or restart at zero."""

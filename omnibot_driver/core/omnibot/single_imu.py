@@ -94,8 +94,8 @@ def take_single(
 
     ``first``: number of bytes in the first piece. ``now``: arrival time of the first piece in s.
 
-    If ``data`` came in pieces, the caller must have excluded that the last byte belongs to the next
-    header.
+    If ``data`` came in pieces, the caller must first make sure that its last byte does not belong
+    to the next header.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -30,9 +30,9 @@ def integer(text: str) -> int:
 
 
 def fields(text: str) -> list[str]:
-    """Return the rest of the text after each blank: one result for each blank.
+    """Return, for each blank in the text, everything after this blank.
 
-    ``integer`` reads the number at the beginning of such a result.
+    ``integer`` reads the number at the beginning of such a text.
     """
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 

@@ -171,8 +171,8 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 def _way(pose: Column, axis: int) -> Column:
     """Return the coordinate of each pose along one axis of the robot.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. The axes x and y have the direction that they have at the
-    mean heading of all these poses.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. The axes x and y turn with the robot. Here, they have one
+    direction for all poses: the direction at the mean heading.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -24,9 +24,9 @@ LARGEST: Final = 0.5
 A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""Largest relative error of a time between ticks that is used.
+"""Relative errors of times between ticks are used only up to this size, in standard deviations.
 
-The unit is the standard deviation, which is estimated from the median size of all errors.
+The standard deviation is estimated from the median size of all errors.
 """
 EXPLAINED: Final = 0.4
 """Fitted marks are accepted only if they explain at least this fraction of the variance.

@@ -96,7 +96,7 @@ class Feed:
         self._spinner.start()
 
     def close(self) -> None:
-        """End the connection. If this monitor has moved the robot, stop the robot before."""
+        """End the connection. If this monitor has moved the robot, stop the robot first."""
         if self.dead_man:
             self.dead_man.stop()
         self._ending.set()

@@ -32,10 +32,9 @@ def variance(settings: LoisEcuSettings, holds_s: float) -> float:
 
 
 def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
-    """The set-points change their sign twice in quick succession.
+    """The set-points change their sign twice in quick succession, so the wheels have not settled.
 
-    With the board's own gains, a wheel then still oscillates: the yaw variance is larger than with
-    the user's gains.
+    With the board's own gains, this makes the yaw variance larger than with the user's gains.
     """
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
@@ -45,10 +44,7 @@ def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own
 def test_a_wheel_that_has_settled_is_not_doubted(
     settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sign change of the set-points adds variance only if it comes soon after another one.
-
-    The variance is that of the yaw.
-    """
+    """A sign change of the set-points adds yaw variance only if it comes soon after another one."""
     soon, late = variance(settings, 0.6), variance(settings, 7.0)
     monkeypatch.setattr(motion_filter, "UNSETTLED_S", (0.0, 0.0))
     assert soon > 1.02 * variance(settings, 0.6)

@@ -54,10 +54,9 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """The full computation (``outside``) accepts every twist that ``on_the_way`` accepts.
+    """The shortcut ``on_the_way`` accepts no twist that the full computation (``outside``) rejects.
 
-    ``on_the_way`` is a shortcut. With at most two set-points, it also accepts every twist close to
-    the line between them.
+    With at most two set-points, the shortcut accepts every twist close to the line between them.
     """
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
@@ -87,7 +86,10 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """A set-point that was replaced loses its weight in the envelope from 0.3 s to 1.1 s later."""
+    """A replaced set-point allows its full velocity for 0.3 s, then less and less.
+
+    It allows nothing later than 1.1 s after its replacement.
+    """
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -164,10 +166,10 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """One long displacement of zero does not prove that a robot is held, but two in a row do.
+    """Motion is commanded, but a displacement over 0.1 s is zero. The robot need not be held.
 
-    Motion is commanded. The displacement covers 0.1 s, in which the robot may have reversed its
-    direction.
+    It may have reversed its direction within the 0.1 s. A second such displacement in a row proves
+    that it is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -180,10 +182,10 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """The wind-up shrinks by the extra distance of a robot that drives faster than commanded.
+    """A robot drives faster than commanded after it was held. This reduces the wind-up.
 
     The wind-up is the distance that a robot has lost while it was held, and may still make up for.
-    It does not fall below zero.
+    The extra distance is subtracted from it. It does not fall below zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

@@ -167,8 +167,8 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
     """Three deltas are lost between two reads. Exactly three deltas are counted as lost.
 
-    Each of the two reads has more than 2 s of data, and SEQ wraps in the first read. Nevertheless,
-    no restart is reported.
+    Each of the two reads has more than 2 s of data, and SEQ wraps in the first one. Neither the
+    long reads nor the wrap is taken for a restart.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
@@ -197,7 +197,7 @@ def test_the_first_delta_has_lost_nothing() -> None:
 
 
 def test_the_poses_have_a_counter_of_their_own() -> None:
-    """A pose with the count 99 comes between deltas 1 and 2. No delta is counted as lost."""
+    """A pose between deltas 1 and 2 has the count 99. This does not mean lost deltas."""
     assert lost(bot(), moved(1), PoseFrame(0.0, 0.0, 0.0, 99), moved(2)) == [0, 0]
 
 
@@ -236,7 +236,7 @@ def test_waking_is_eight_zeros_and_stop() -> None:
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
     """To start the board, the driver sends S. It may do so in every mode, because S is harmless.
 
-    When the driver sends S, it does not assume a new mode. It does so only when it receives data.
+    S alone does not change the mode. The mode changes only when data of the board show a new one.
     """
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"

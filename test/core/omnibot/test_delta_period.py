@@ -138,11 +138,11 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """A pose does not contradict deltas that were all rounded in the same direction.
+    """The rounding of the deltas does not make them contradict the next pose.
 
-    Each delta is rounded by up to 0.05 mrad, so the rounding errors add up. If the next pose
-    differs from the deltas by the sum of these errors, the pose has no cost. If it differs by more
-    than twice this sum, the pose has a cost.
+    Each delta is rounded by up to 0.05 mrad. If all deltas are rounded in the same direction, the
+    errors add up. A pose that differs from the deltas by the sum of these errors has no cost. A
+    pose that differs by more than twice this sum has a cost.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
@@ -274,10 +274,10 @@ def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) 
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """At any delta period, the number of damaged bytes shows how many IMU frames were lost.
+    """At any delta period, the number of discarded bytes shows how many IMU frames were lost.
 
-    An IMU frame (14 bytes) and a delta (9 bytes) are damaged. The driver discards the 23 bytes, and
-    counts one lost IMU frame.
+    Here, an IMU frame (14 bytes) and a delta (9 bytes) are damaged. The driver discards the 23
+    bytes, and counts one lost IMU frame.
     """
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)

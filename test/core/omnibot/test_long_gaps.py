@@ -20,11 +20,11 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """The first pose that the driver publishes after a long gap is right.
+    """All frames are lost for more than 1 s. The first pose published after the gap is right.
 
-    All frames are lost for more than 1 s. After the gap, the driver holds displacements back until
-    the board's next pose arrives. Here, this takes up to 0.2 s. So the driver can correct the first
-    pose before it publishes it.
+    The reason: after the gap, the driver holds displacements back until the board's next pose
+    arrives. Here, this takes up to 0.2 s. So the driver can correct the first pose before it
+    publishes it.
     """
     for seed in range(5):
         on = line(seed)

@@ -68,9 +68,9 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """Every twentieth read is late. From a late read follows a lower bound that is too high.
+    """Every twentieth read is late, so its lower bound is later than the tick's true time.
 
-    Such lower bounds do not raise the fitted line.
+    Such lower bounds do not make the fitted clock later.
     """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
@@ -83,9 +83,10 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For 4 s, reads are slightly late. Their lower bounds contradict other upper bounds.
+    """For 4 s, reads are slightly late. Their lower bounds are wrong: later than the true times.
 
-    A tick is never later than its upper bound, so the fit discards these lower bounds.
+    These lower bounds contradict the upper bounds of the other reads. An upper bound is always
+    right, because no tick is later than it. So the fit discards the lower bounds.
     """
     _, late_s = followed(
         0.0,

@@ -60,8 +60,8 @@ def all_of(port: int) -> Iterator[bytes]:
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """No program reads the terminal. The board continues to send.
 
-    The terminal keeps only the oldest bytes. It may keep more than ``UNREAD_LIMIT`` bytes, because
-    a busy kernel counts bytes late.
+    The terminal keeps only the oldest bytes, up to a limit. The test allows twice ``UNREAD_LIMIT``,
+    because a busy kernel counts bytes late.
     """
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)

@@ -34,9 +34,9 @@ def test_each_channel_has_its_own_faults() -> None:
 
 
 def test_a_request_is_answered_when_its_move_is_done() -> None:
-    """The reply to the toy board's command ``move`` comes at the end of the move.
+    """The toy board executes ``move``, and replies to this command at the end of the move.
 
-    Before that, another ``move`` fails, and the query ``odo`` is answered at once.
+    During the move, another ``move`` fails, and the query ``odo`` is answered at once.
     """
     wired = WiredBoard(ToyServer())
     wired.receive(b"move 0.02", 5.0)
@@ -70,7 +70,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """A board gets the arrival time of a late datagram by the clock of the caller.
+    """The arrival time of a late datagram is by the caller's clock, not by the board's clock.
 
     The caller sends a datagram at 1000 s of its own clock. The network delays the datagram by up to
     1 s. The board's own clock shows a different time.

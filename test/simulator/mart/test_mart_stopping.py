@@ -203,8 +203,8 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
     """SL on the stop port comes while a controlled move still measures the gyro's bias.
 
-    A first SL comes 0.03 s after the start, and the server ignores it. In a second move, SL comes
-    0.1 s after the start, and the move ends late.
+    If SL comes 0.03 s after the start, the server ignores it and completes the move. If SL comes
+    0.1 s after the start, the robot still moves, and the move ends only about 0.85 s after SL.
     """
     rig = Rig()
     rig.say("TF 24")

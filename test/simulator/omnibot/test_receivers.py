@@ -251,9 +251,10 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """Some receivers count the bytes that arrive during the boot as wake-up bytes, others do not.
+    """The board needs three bytes to wake up. Two bytes arrive during the boot.
 
-    The board needs three bytes to wake up. Two of them arrive during the boot.
+    Some receivers count these two bytes, so they need only one more. Others do not count them, and
+    need three more.
     """
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()

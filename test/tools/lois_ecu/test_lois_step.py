@@ -247,10 +247,9 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
 def test_a_step_is_predicted_as_the_simulated_board_makes_it(
     firmware: Firmware, gains: PiGains
 ) -> None:
-    """The tool's prediction of a step agrees with the step of a simulated board.
+    """For each firmware, the tool's prediction of a step agrees with the step of a simulated board.
 
-    The firmwares run their controllers at different rates, 11 or 5 times a second. The prediction
-    agrees for each firmware.
+    The firmwares run their controllers at different rates: 11 or 5 times a second.
     """
     motor = MotorSettings(
         rpm_per_percent=0.66,
@@ -297,8 +296,8 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
     """The tool refuses a record in which every time is the largest number that the record can hold.
 
-    The true times may be longer, so they are unknown. With the unit of the manual (100 ns), the
-    largest number means 6.6 ms. The usual times between ticks are longer than this.
+    The true times may be longer, so they are unknown. This happens if the unit is 100 ns, as in the
+    manual: the largest number then means 6.6 ms, and the usual times between ticks are longer.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
