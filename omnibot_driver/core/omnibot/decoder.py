@@ -304,7 +304,7 @@ class FrameDecoder:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
         A frame is decided if later bytes cannot change the decision. A frame that ends at the
-        position ``until`` or before is decided in any case.
+        position ``until`` or before is decided without waiting for later bytes.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

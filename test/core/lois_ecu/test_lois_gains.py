@@ -64,8 +64,8 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
     """The driver writes its settings in rounds. The lines of a round arrive without a pause.
 
-    The last line of a round requests a date. The board sends this date at once, and loses what
-    arrives meanwhile. Every setting still reaches the board.
+    The board loses what arrives while it sends a date. Each round requests a date, but only in its
+    last line. So every setting reaches the board.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)

@@ -86,10 +86,11 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The robot moves without a command, some time after a rejected forward drive (RM).
+    """The robot moves without a command. The driver does not take this for a defect of the server.
 
-    If the server rejects RM and the robot then moves, the server may be defective. But here the
-    server has obeyed another RM in between. Therefore, the driver still allows motion.
+    A defective server rejects a forward drive (RM), and moves the robot nevertheless. Here, the
+    server rejected an RM some time ago, but it has obeyed another RM since then. So the driver
+    still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58

@@ -141,10 +141,10 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """A held robot loses distance, so its wheel controllers wind up.
+    """A held robot falls behind its set-point, so its wheel controllers wind up.
 
-    The wind-up is 1.2 times the lost distance, up to the integrator's limit. Normal motion reduces
-    it.
+    The wind-up grows by 1.2 times the distance that the robot falls behind, up to the integrator's
+    limit. Normal motion reduces it.
     """
     wind_up = WindUp()
     for _ in range(10):
@@ -166,10 +166,10 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """Motion is commanded, but a displacement over 0.1 s is zero. The robot need not be held.
+    """A displacement of zero over 0.1 s does not prove that a robot is held. Two in a row prove it.
 
-    It may have reversed its direction within the 0.1 s. A second such displacement in a row proves
-    that it is held.
+    Motion is commanded. In 0.1 s, the robot may have reversed its direction, so that its
+    displacement is zero although it is not held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -182,10 +182,11 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """A robot drives faster than commanded after it was held. This reduces the wind-up.
+    """A robot moves faster than its set-points allow. This reduces the wind-up.
 
-    The wind-up is the distance that a robot has lost while it was held, and may still make up for.
-    The extra distance is subtracted from it. It does not fall below zero.
+    The wind-up is the distance that the wheel controllers may still drive in addition to the
+    commanded motion. The distance of this extra motion is subtracted from it. It does not fall
+    below zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

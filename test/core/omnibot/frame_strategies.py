@@ -34,9 +34,9 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    It sends no pose with a coordinate above 1e7, in mm or mrad. It sends no IMU frame that has both
-    an acceleration below 0.5 g and an acceleration word of -6. A word of -6 has the same bytes as a
-    header.
+    An undamaged board sends no pose with a coordinate above 1e7, in mm or mrad. It sends no IMU
+    frame that combines an acceleration below 0.5 g with an acceleration word of -6, which has the
+    same bytes as a header.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

@@ -107,11 +107,10 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A «Paused» text continues the text before it only if nothing came between the two texts.
+    """A «Paused» text continues the «Paused» text before it only if two conditions are true.
 
-    Two conditions must be true: the board sent no other data between the two texts, and at most
-    nine «Paused» texts were lost between them. Otherwise the board may have run or restarted in
-    between.
+    The board sent no other data between the two texts, and at most nine «Paused» texts were lost
+    between them. Otherwise the board may have run or restarted in between.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]

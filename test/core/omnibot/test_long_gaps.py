@@ -101,7 +101,7 @@ def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: in
 
 
 def test_a_pose_that_does_not_correct_continues_the_motion_for_two_seconds_at_most() -> None:
-    """If poses do not correct odom, odom continues the motion in a long gap for only 2 s.
+    """In a long gap, odom continues the motion for only 2 s if poses do not correct odom.
 
     The robot drives at 0.25 m/s, and ``use_board_pose`` is off. A pose arrives after a gap of 600
     deltas, that is 24 s. In the gap, odom continues for 2 s, that is 0.5 m.

@@ -178,11 +178,11 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """Data that a board sends during a step makes the overshoot only a little larger.
+    """The board's controller is delayed while the board sends data.
 
-    The reason for the larger overshoot: the board's controller is delayed while the board sends.
-    The tuned gains have an overshoot of at most 5 % if the board does not send. If it sends, 95 %
-    of the overshoots are below 8 %.
+    Data during a step therefore makes the overshoot larger, but only a little. If the board does
+    not send, the tuned gains have an overshoot of at most 5 %. If it sends, 95 % of the overshoots
+    are below 8 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
