@@ -27,8 +27,9 @@ new emergency stop."""
 BYE = b"!"
 """Message that ends the guard. The driver sends it after it has stopped the robot itself."""
 WRITTEN = b"w"
-"""Message directly before the end of input, from a driver that has written its last packets itself.
-These packets may still wait in the kernel, so the guard must not discard the kernel's output."""
+"""Last message before the driver closes the guard's input, if the driver has written its last
+packets itself. These packets may still wait in the kernel, so the guard must not discard the
+kernel's output."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20

@@ -134,7 +134,7 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        While the board runs, this reason does not apply to commands to stand still.
+        While the board runs, the driver still accepts commands to stand still.
         """
         return ""
 
@@ -205,8 +205,8 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        The list can contain OdometryReadings, NoticeReadings and results of requests although the
-        board is silent. So these do not show that the board is alive.
+        The list can contain OdometryReadings, NoticeReadings and results of requests. The board may
+        be silent meanwhile, so such readings do not show that the board is alive.
         """
         return []
 

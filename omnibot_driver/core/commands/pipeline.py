@@ -177,7 +177,7 @@ class CommandPipeline:
     def said(self, now: float) -> None:
         """Tell the motion monitor which set-point the robot should follow from ``now`` on.
 
-        It is the set-point that was sent last. During a drive to a goal, it is None.
+        The set-point is the one that was sent last, or None during a drive to a goal.
         """
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
@@ -193,8 +193,9 @@ class CommandPipeline:
     def count_refused(self, count: int, now: float) -> list[str]:
         """React to rejected displacements; return notices for the user.
 
-        ``count``: number of displacements that were rejected since the driver began. If several
-        displacements are rejected in a row, the robot does not move as commanded.
+        Several rejected displacements in a row show that the robot does not move as commanded.
+
+        ``count``: number of displacements that were rejected since the driver began.
         """
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)

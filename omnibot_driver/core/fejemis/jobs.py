@@ -34,8 +34,7 @@ ANSWERED_WITHIN_S: Final = 4.5
 """``CALIBRATED_WITHIN_S``: longest duration of a calibration in s, from the user's request.
 ``ANSWERED_WITHIN_S``: longest duration of any other job. After this time, the job has failed."""
 CALIBRATION_S: Final = 1.2
-"""Duration of a calibration in s. In this time, the board averages its readings for about a second.
-"""
+"""Duration of a calibration in s. For about a second of it, the board averages its readings."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
 """How many times the driver sends the command of a job.
@@ -48,9 +47,9 @@ UNCHANGED_S: Final = 2.4
 If the offsets are still unchanged after this time, the command was probably lost.
 """
 CALIBRATIONS: Final = 2
-"""Largest number of commands to calibrate in one job.
+"""Largest number of times that one job sends the command to calibrate.
 
-The driver sends another command only if the offsets stay unchanged.
+The driver repeats the command only if the offsets stay unchanged.
 """
 
 Lines = dict[Role, list[bytes]]
@@ -65,7 +64,8 @@ reports the offsets."""
 def whole_seconds(delay_s: float) -> int:
     """Return the delay in whole seconds, at least 1.
 
-    The delay is increased until the checksum detects the loss of any two digits of the delay.
+    A line can lose two digits of the delay on its way to the board. For some pairs of digits, the
+    checksum does not detect this loss. So the delay is increased until it contains no such pair.
     """
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
@@ -153,7 +153,8 @@ class Jobs:
     def restarted(self, role: Role) -> None:
         """End the running job as failed, because the board ``role`` has restarted.
 
-        A power-off needs only the drive board, so it continues if the front board has restarted.
+        If the front board has restarted, a power-off continues, because it needs only the drive
+        board.
         """
         if role == "front" and self.job is Job.POWER_OFF:
             return

@@ -16,8 +16,10 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest time in s by which a line may seem to arrive early. If it seems earlier, the board time
-is implausible."""
+"""Longest time in s by which a line may seem to arrive early.
+
+If a line seems to arrive earlier than that, its board time is implausible.
+"""
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
 WAITED_S: Final = 1.0
@@ -28,12 +30,12 @@ In this period, a line is accepted however late it is, because it may have waite
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""Tolerance in s with which board times must agree, so that the clock begins anew.
+"""Tolerance in s within which implausible board times must agree to begin the clock anew.
 
-The clock begins anew after ``AGAIN`` implausible board times in a row. Two conditions must hold.
-The last of these times must arrive at least ``AGAIN_AFTER_S`` s after the first. From the first
-time to each of the others, the board time must advance as much as the arrival time, within this
-tolerance.
+``AGAIN`` such times in a row begin the clock anew. Two conditions must hold. From the first time to
+each of the others, the board time advances as much as the arrival time, within this tolerance. The
+last time arrives at least ``AGAIN_AFTER_S`` s after the first. The times of lines that seem early
+must agree within the same tolerance.
 """
 EARLIES_WITHIN_S: Final = 1.0
 """Longest time in s from a line that seems early to the newest such line, if both count together.

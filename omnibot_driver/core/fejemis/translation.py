@@ -143,9 +143,10 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add IMU samples and orientations to the readings, until a sample must wait for a pose.
+        """Add the waiting IMU samples and orientations to the readings, in order of arrival.
 
-        The caller calls this method after a pose and at the end of a read.
+        If a sample must wait for a pose, this sample and everything after it stay in the queue. The
+        caller calls this method after a pose and at the end of a read.
         """
         for item in self._pairs.take():
             if isinstance(item, Pair):

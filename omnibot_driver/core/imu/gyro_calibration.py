@@ -71,7 +71,7 @@ class Look:
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
         """Add a displacement.
 
-        Its axes do not matter, because the sums only show whether the robot has moved.
+        Its axes do not matter, because the displacements only show whether the robot has moved.
         """
         self.displacements += 1
         self._x_m += dx_m

@@ -29,9 +29,9 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""How long the driver predicts the pose after the last report, in periods of the tick reports. If
-this time is shorter than ``UNHEARD_S`` (in s), the driver predicts the pose for ``UNHEARD_S``. The
-last report can also be an odometry report."""
+"""How long the driver predicts the pose after the last report: ``UNHEARD_GROUPS`` periods of the
+tick reports, but at least ``UNHEARD_S`` seconds. The last report can be a tick report or an
+odometry report."""
 LOST_REPORTS_S: Final = 1.2
 """Limit in s for the duration of a silence of the board. The driver uses it to decide what happened
 in the silence. If the silence was shorter and no set-point changed in it, the driver assumes that
@@ -42,7 +42,7 @@ show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
 """Largest tick count, in turns of the wheel, that the driver takes for a sign of a restart while
 the robot is at rest. After a restart of the board, the counts begin at zero. A larger count may
-come from a push of the robot. A count of one tick is accepted even if it is above this limit."""
+come from a push of the robot. The limit is at least one tick."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -60,10 +60,10 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. While this is true, the wheels keep
-        their ``blind`` flags. They are needed if one read contains first the ticks that gave the
-        estimate, and then an odometry report. With the flags, the report can still correct the
-        motion before the estimate."""
+        """Whether no time has passed since the last estimate. One read can contain ticks, which
+        give an estimate, and then an odometry report, which corrects the motion before this
+        estimate. This correction needs the wheels' ``blind`` flags. So the flags are cleared only
+        when time passes."""
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -323,7 +323,7 @@ class LoisOdometry:
     def _after_silence(self, now: float) -> None:
         """Add errors to the wheels' distances after a silence in which the motion is unknown.
 
-        In the silence, a Stop may have been lost. The wheels have then rolled on.
+        A Stop may have been lost in the silence, so the wheels may have rolled until now.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:

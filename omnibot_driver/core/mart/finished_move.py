@@ -36,8 +36,8 @@ class Done:
 
     The network may have duplicated the request. The duplicate starts a second run of the same move.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, only
-    this run is measured.
+    ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, they are
+    those of the second run alone.
 
     ``lasted_s``: time in s from the request to the reply.
 
@@ -132,7 +132,8 @@ class Done:
     def has_run_twice(self) -> bool:
         """Whether the measurements show that the server has run the move twice.
 
-        In this case, the first run was complete, and the driver has stopped the second run.
+        They show this if the server has completed the move, but the encoder count is too small for
+        it. Then the count is that of a second run, which the driver has stopped.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
@@ -142,8 +143,8 @@ class Done:
         """Whether the reply came so late that the server may have run the move twice.
 
         If the network has duplicated the request, the server runs the move twice, and answers each
-        run. If the network has then lost the answer to the first run, this reply is the answer to
-        the second run.
+        run. If the network also loses the answer to the first run, the driver receives only the
+        answer to the second run, which comes late.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -151,8 +152,8 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply is the answer to another request. The driver did not know this. So after the
-        reply, it may have sent a stop to end a possible second run. This stop has in fact ended the
+        Such a reply is the answer to another request, but the driver took it for the answer to the
+        move. If the driver then sent a stop to end a possible second run, this stop has ended the
         first run.
         """
         return self.lasted_s < FULL * self.usual_s

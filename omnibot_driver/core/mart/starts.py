@@ -127,10 +127,11 @@ class Starts(FailedStarts):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether an earlier HELLO may reach the server after ``start``, a controlled move.
 
-        For other starts, the result is False. The server might answer the late HELLO just before it
-        executes a duplicate of the move. From this answer, the driver would wrongly conclude that
-        there is no duplicate. After a fresh check of the IMU, this cannot happen: the driver waits
-        before such a check, so no earlier HELLO can arrive after it.
+        The server might answer the late HELLO just before it executes a duplicate of the move. From
+        this answer, the driver would wrongly conclude that there is no duplicate.
+
+        For other starts, the result is False. It is also False after a fresh check of the IMU: the
+        driver waits before such a check, so no earlier HELLO can arrive after it.
         """
         moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
         return moves and now < self._greeted_s + self._delay_s

@@ -61,8 +61,8 @@ class PendingDisplacements:
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Return the time in s without a report before the first displacement that waits here.
 
-        ``last_stamp_s``: stamp of the last report before this displacement. It is used only if the
-        displacement has no duration.
+        It is the number of lost displacements times the duration of this displacement. If this
+        duration is unknown, it is the time since ``last_stamp_s``, the stamp of the last report.
         """
         if not self._waiting:
             return 0.0

@@ -18,9 +18,9 @@ SPEED_PER_WAY = 2.0
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
-"""Distance from the goal in m up to which the robot does not drive.
+"""Largest distance from the goal, in m, at which the robot no longer drives.
 
-It is also the angle in rad up to which the robot does not turn.
+It is also the largest angle, in rad, at which the robot no longer turns.
 """
 
 

@@ -15,8 +15,9 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Smallest number of averages from which an Allan deviation is computed. The longest averaging time
-is therefore one ninth of the recording."""
+"""Smallest number of averages from which an Allan deviation is computed. With a longer averaging
+time, a recording contains fewer averages. So the longest averaging time is one ninth of the
+recording."""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 58.0
 """Shortest recording, in s, from which the tool estimates bias instability and random walk.

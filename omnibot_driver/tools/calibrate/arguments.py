@@ -37,7 +37,7 @@ NEEDS: Final = {
 """For each subcommand: names of driver parameters, and a text for the error message.
 
 The subcommand works if the driver has at least one of these parameters. Otherwise, the error
-message contains the text as what the board does not have, such as "an IMU".
+message says that the board does not have what the text names, such as "an IMU".
 """
 
 

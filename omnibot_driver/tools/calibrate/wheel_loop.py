@@ -109,7 +109,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Return how many counts the wheel turns in ``share`` ticks after it was at rest.
+        """Return how many counts the wheel turns in ``share`` ticks if it starts from rest.
 
         The effort is constant, and leads to a final speed of one count per tick.
         """
