@@ -185,8 +185,8 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
     """The driver passes on the result of a request before the simulated clock has begun.
 
-    A result needs no stamp. The other readings of types that only one board has need a stamp, so
-    the driver does not publish them.
+    A result needs no stamp. Measurements that only one board makes need a stamp, so the driver does
+    not publish them before the clock has begun.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -252,10 +252,11 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One read contains a report of a pause, and then data. So the pause is over after the read.
+    """A pause begins and ends within one read. Later subscribers get the state "nominal".
 
-    In the middle of the read, another thread publishes the state "paused". Therefore the driver
-    publishes "nominal" after the read. Otherwise, later subscribers would get "paused".
+    The read contains a report of a pause, and then data. In the middle of the read, another thread
+    publishes the state "paused". So the driver must publish "nominal" after the read. Otherwise,
+    later subscribers would get "paused".
     """
     session, publishing = session_with(node)
     published: list[str] = []

@@ -53,9 +53,10 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return the comparisons of the driver with the floor, and an empty list.
+    """Return figures that compare the driver with the floor, and an empty list.
 
-    The list is for further sections of the report.
+    The floor is the smallest program with the same output. The list is for further sections of the
+    report.
     """
     windows = 2 if quick else 12
     with ExitStack() as stack:

@@ -129,10 +129,10 @@ def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: b
 
 @pytest.mark.parametrize("waits", [ImuFrame((0, 0, -16384), (0, 0, -1)), DeltaFrame(7, 0, 0, 255)])
 def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: Frame) -> None:
-    """A frame is held when the board falls silent, and is never published.
+    """The board falls silent while the decoder holds a frame. This frame is never published.
 
-    The last byte of this frame may begin another frame, so the decoder holds the frame. The mode of
-    the board is not known yet. When new data comes, the driver publishes only the new data.
+    The decoder holds the frame because its last byte may begin another frame. The mode of the board
+    is not known yet. When new data comes, the driver publishes the new data without the held frame.
     """
     bench, rest = Bench(), encode(REST)
     bench.open()

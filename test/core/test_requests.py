@@ -101,7 +101,8 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
     """During a request, the session never asks to be called before something is due.
 
-    Its ``wake_at`` is always in the future. The board sends data, or is silent.
+    Its ``wake_at`` is always in the future, both with a board that sends data and with a silent
+    board.
     """
     bench = Bench()
     bench.speaks = speaks
@@ -253,9 +254,9 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 @pytest.mark.slow
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """The driver pauses the board when it receives again, although a pause and a reset have failed.
+    """A pause and then a reset fail, because the board receives nothing.
 
-    Both requests failed because the board received nothing.
+    The driver still wants the board to pause. When the board receives again, the driver pauses it.
     """
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)

@@ -25,8 +25,10 @@ TICKS: Final = 3000
 SILENCE_S: Final = 1.0
 """Shortest interruption of the data, in s, after which the driver is allowed to blame the cable."""
 TRANSIT: Final = 200
-"""Largest number of frames that are in transit when a comparison begins: the board has sent them
-before, but the driver may publish them after that."""
+"""Largest number of frames that are in transit when a comparison begins.
+
+The board has sent these frames already, but the driver may publish them after the beginning.
+"""
 REACH: Final = 200
 """Number of sent frames that are compared with one published message. They are the next frames
 after the one that matched the previous message. If no frame equals the message, the message is

@@ -52,8 +52,8 @@ class Bound:
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded with this chunking.
 
-        A chunking in ``BUSY_LOOPS`` never needs more than 99.9 %, because both its adapter and its
-        reader are late. Otherwise, the share is ``delivered``.
+        The share is ``delivered``. For a chunking in ``BUSY_LOOPS``, it is at most 99.9 %, because
+        both its adapter and its reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

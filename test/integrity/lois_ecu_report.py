@@ -2,9 +2,9 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board shares no code with the driver. The decoded reports are compared with the true
-reports. A decoded report is right if it equals a true report, and if right reports have the order
-of the true reports.
+The simulated board shares no code with the driver. The *true* reports are those that are decoded
+from the undamaged stream. The reports from a damaged stream are matched with equal true reports, in
+the same order. A report without a match is wrong.
 """
 
 from collections import Counter

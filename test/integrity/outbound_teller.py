@@ -2,8 +2,8 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-A moving robot always has the twist that the driver commanded last. It has this twist even if the
-line has damaged the command. So the driver cannot see the damage in the readings.
+The readings of a moving robot show the twist that the driver commanded last, even if the line has
+damaged this command. So the driver cannot see the damage in the readings.
 """
 
 import math

@@ -146,8 +146,8 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
     """The form at the end of the commissioning guide lists all steps of the guide.
 
-    Each parameter that the form names is a parameter of the driver, except ``imu_rpy`` of the
-    robot's description.
+    Each parameter that the form names is a parameter of the driver. The only exception is
+    ``imu_rpy``, which belongs to the robot's description.
     """
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))

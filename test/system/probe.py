@@ -183,7 +183,10 @@ class Probe:
         threading.Timer(WARN_EVERY_S + 2 * SETTLE_S, publish).start()
 
     def forget_message(self) -> None:
-        """Do not publish the newest message again: the test has repeated it until it was obeyed."""
+        """Forget the newest message, so that ``publish_again`` does nothing.
+
+        The test has already repeated this message until it was obeyed.
+        """
         self._publish_again = lambda: None
 
     def call_again(self) -> None:

@@ -40,7 +40,7 @@ poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
 
 @given(poses, st.integers(0, 1000))
 def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
-    """Whatever the robot's pose, the demo commands motion, at most at the demo's maximum speed."""
+    """Whatever the robot's pose, the demo commands a motion within the demo's speed limits."""
     _, twist = square.steer(pose, leg)
     assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
     assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS

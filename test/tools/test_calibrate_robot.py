@@ -30,7 +30,8 @@ SLOWLY = (0.15, 0.0, 0.0)
 BOUNDS = Bounds(speed=0.2, turning=0.5, way=0.8, turn=1.0, seconds=20.0, acceleration=1.0)
 AFTER_S = 0.4
 LATE_S = 0.1
-"""Step in s between two commands of a motion above which the computer was too busy."""
+"""Longest accepted time in s between two commands of a motion. If it is longer, the computer was
+too busy, and the test repeats the motion."""
 LOST_S = listener.LOST_S
 
 
@@ -50,7 +51,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` at each call later than ``AFTER_S`` seconds."""
+    """Return a callback that calls ``action`` at each call after ``AFTER_S`` seconds of motion."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -200,10 +201,10 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
     robot: Robot, rigged: Rig, late: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If ctrl-C comes before the first command, the motion monitor is on afterwards.
+    """The user presses ctrl-C while the tool switches the motion monitor off before a motion.
 
-    The user presses ctrl-C while the tool switches the monitor off. The tool's message does not ask
-    the user to cut the power.
+    The monitor is on again afterwards. The tool has not sent a command yet, so its message does not
+    ask the user to cut the power.
     """
     set_parameters, presses = robot.set_parameters, [signal.SIGINT]
 
@@ -253,10 +254,9 @@ def test_parameters_are_restored_after_an_interruption(robot: Robot, rigged: Rig
 
 
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """If a bug interrupts a motion, the tool still switches the motion monitor on again.
+    """A bug in the tool interrupts a motion. The tool still switches the motion monitor on again.
 
-    The bug is in the tool. Without this, the driver's monitor would stay off until the driver
-    restarts.
+    Otherwise, the driver's monitor would stay off until the driver restarts.
     """
 
     def fail() -> None:

@@ -238,9 +238,10 @@ def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) ->
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """The odometry is reset while the robot drives to a goal. The driver sends the Stop frame.
+    """The odometry is reset while the robot drives to a goal, which discards the goal.
 
-    A velocity frame with zeros (mode 1) would be a goal at the origin.
+    The driver sends the Stop frame. A velocity frame with zeros (mode 1) would be a goal at the
+    origin.
     """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)

@@ -275,10 +275,10 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
+    """Lines are lost, arrive twice or arrive late. Only one kind of pair has lines of two samples.
 
-    One kind of false pair is excepted: both of its lines are late, and no pose follows in the same
-    read. Then nothing in the stream shows that the lines belong to different samples.
+    Both lines of such a pair are late, and no pose follows in the same read. Then nothing in the
+    stream shows that the lines belong to different samples.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -313,7 +313,8 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
     """The host reads every 0.2 s. Each read begins with samples, before its first pose.
 
-    The driver publishes these samples, too.
+    These samples wait for this pose, which shows that the board was not silent. Then the driver
+    publishes them, too.
     """
     bench = nominal()
     bench.run(3.0)

@@ -192,7 +192,7 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
     """A turn on the spot begins while the front wheel points ahead. The robot does not roll away.
 
-    Without waiting for the front wheel, it would roll 0.17 m.
+    It waits until the front wheel has turned. Without this wait, it would roll 0.17 m.
     """
     bench = nominal()
     for _ in range(12):
@@ -277,9 +277,9 @@ def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
-    """In this firmware, the front wheel takes the same angle for a curve backward as forward.
+    """The user commands a curve backward, and the robot follows it.
 
-    The robot follows a curve that the user commands backward.
+    In this firmware, the front wheel has the same angle in a curve backward as in a curve forward.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)

@@ -114,8 +114,8 @@ def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
     """The odometry is reset while the compass shows 120°. Later headings of 120° are accepted.
 
     A board that faces north may falsely report 120°, so the driver rejects 120° while it expects a
-    heading near north. This robot does not face north. The reset sets its yaw to zero, but the
-    driver still knows which heading to expect.
+    heading near north. Here it expects 120°, before and after the reset: the reset sets the yaw to
+    zero, but does not change the expected heading.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

@@ -221,10 +221,10 @@ def test_a_terminal_mode_refuses_a_reset_at_once(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
-    """The driver drops a record that it has given up, when the record arrives later.
+    """The driver gives a record up, and drops this record when it arrives later.
 
-    The drive mode changes during the record, so the driver gives the record up. The board completes
-    the record and sends it. Its lines still show the driver that the board is connected.
+    The driver gives it up because the drive mode changes during the record. The board completes the
+    record and sends it. Its lines still show the driver that the board is connected.
     """
     bench = Bench("firmware")
     bench.record(RecordKind.TORQUE, 60)

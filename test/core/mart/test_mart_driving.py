@@ -37,7 +37,7 @@ def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) ->
     """On a straight drive with a gyro without noise, the driver does not report a failed IMU.
 
     The heading hardly changes on such a drive, as if the IMU had failed. So the driver steers a
-    little. The changes of the heading that follow show that the IMU works.
+    little. The heading then changes, which shows that the IMU works.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)

@@ -76,9 +76,9 @@ def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
-    """Let the network deliver the next ``word`` command twice. The copy is ``later_s`` later.
+    """Let the network duplicate the next ``word`` command; the copy comes ``later_s`` later.
 
-    Return a list, to which this command is added when the driver sends it.
+    Return a list. It is empty until the driver sends this command, and then contains the command.
     """
     path = bench.robot.network[0].to_board
     real, moves = path.send, list[bytes]()
@@ -149,8 +149,9 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """The robot drives half as far as requested. Queries are lost for 0.7 s after the move.
 
-    A second run is possible, so the driver sends a stop command. It does not know how far this
-    robot drives in one run, so it adds nothing to the pose.
+    A second run is possible, so the driver sends a stop command. But the driver has not learned how
+    far this robot drives in one run. So the short distance does not show a second run, and the
+    driver adds nothing to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)

@@ -232,8 +232,9 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 ) -> None:
     """The server restarts in a curve. The motors keep their last command for some seconds.
 
-    After the restart, the server's relative heading begins at zero. So ``odom`` is wrong by up to
-    80°, and the covariance includes this error.
+    After the restart, the server's relative heading begins at zero. So the driver does not learn
+    how far the robot has turned meanwhile. ``odom`` is wrong by up to 80°, and the covariance
+    includes this error.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)

@@ -136,8 +136,8 @@ def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
     """The motion monitor has stopped the robot. Then the driver stalls, and loses commands.
 
-    The time of the stall does not count as silence of the sender. So the driver accepts commands
-    only when the sender has been silent for the timeout after the stall.
+    The driver refuses commands until the sender has been silent for the timeout. The time of the
+    stall does not count as silence, so this silence must begin after the stall.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -150,9 +150,10 @@ def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
 
 
 def test_a_stall_of_the_driver_does_not_bring_back_a_refusal_that_has_ended() -> None:
-    """The motion monitor has stopped the robot, and no command came for ``cmd_vel_timeout``.
+    """The driver stalls after a refusal of commands has ended. The next command is obeyed.
 
-    Then the driver stalls. The next command is obeyed.
+    The motion monitor has stopped the robot, so the driver refuses commands. No command comes for
+    ``cmd_vel_timeout``, which ends the refusal. Then the driver stalls.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -198,10 +198,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The line is interrupted. So the end of a later frame follows the beginning of a frame.
+    """The line is interrupted from the middle of one frame to the middle of a later frame.
 
-    The two parts together have the length of one frame. The decoder rejects them nevertheless,
-    because there is a pause between them.
+    The two parts that arrive have together the length of one frame. The decoder rejects them
+    nevertheless, because there is a pause between them.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
@@ -247,8 +247,7 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""A dictionary of cases. In each case, several reads bring a delta, of which two bytes have already
-come.
+"""Cases by name. Two bytes of a delta have already come; the reads of each case bring the rest.
 
 Each text is one read: the time in ms since the previous read, and the bytes of the read.
 """
