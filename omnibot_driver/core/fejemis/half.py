@@ -123,9 +123,9 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        The caller must not collect the messages first. A message that shows a restart makes the
-        half forget all times of the board from before the restart. The caller needs these times for
-        the messages before it.
+        The caller must not collect the messages first. If a message shows a restart, the half
+        forgets all times of the board from before the restart. But the caller needs these times for
+        the messages that precede this message.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

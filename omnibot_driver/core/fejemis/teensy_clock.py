@@ -38,7 +38,7 @@ last time arrives at least ``AGAIN_AFTER_S`` s after the first. The times of lin
 must agree within the same tolerance.
 """
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s from a line that seems early to the newest such line, if both count together.
+"""Longest time in s for which a line that seems early is counted together with later such lines.
 
 A line seems early if it arrives earlier than the clock predicts. The reason: the clock began with a
 line that was late. After three (``AGAIN``) lines that seem early, the clock begins anew. Other

@@ -120,8 +120,9 @@ class SimulatedLois:
     def terminal_mode(self) -> int:
         """Terminal mode that the last command 0x11 set.
 
-        In other modes than 0 and 4, the board sends no periodic messages and no records. Without
-        the quirk ``button_is_lost_in_terminal_mode``, it still reports the e-stop button.
+        In other modes than 0 and 4, the board sends no periodic messages and no records. In these
+        modes, it reports the e-stop button, unless the board has the quirk
+        ``button_is_lost_in_terminal_mode``.
         """
         return self._terminal.mode
 

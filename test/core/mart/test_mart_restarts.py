@@ -252,8 +252,8 @@ def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
 ) -> None:
     """Another server answers at the controller's address. Then the controller is started there.
 
-    There is no silence between the two servers that would show the change. Still, the driver sends
-    nothing that would crash the controller's server while it starts up.
+    The address is never silent, so no silence shows the change. Still, the driver sends nothing
+    that would crash the controller's server while it starts up.
     """
     bench = MartBench("source").ready()
     seconds = 8.0 + offset_s

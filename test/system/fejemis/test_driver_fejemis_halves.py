@@ -28,9 +28,9 @@ STOP = "rc 2 0 0"
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """If one of the two Teensys is unplugged during a drive, the driver stops the other one.
+    """One of the two Teensys is unplugged during a drive. The driver stops the motors of the other.
 
-    When the unplugged Teensy is plugged in again, the driver stops it as well.
+    When the unplugged Teensy is plugged in again, the driver stops its motors, too.
     """
     said = len(driver.lines)
     assert probe.call(SetBool, "brush", data=True).success
