@@ -28,8 +28,8 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s.
 
-The reader thread may itself wait for the guard process. After 2.5 s, the reader
-kills a guard that hangs. Only a guard in an uninterruptible sleep takes longer.
+The reader thread may itself wait for the guard process. It kills a guard that has hung for 2.5 s.
+Only the end of a guard in an uninterruptible sleep takes longer.
 """
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
@@ -37,15 +37,15 @@ driver waits longer."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest, if there is no guard.
 
-A guard process could repeat Stop after the shutdown. With a guard, the driver waits only for
-``STANDS_WITHIN_S``.
+With a guard, the driver waits only for ``STANDS_WITHIN_S``, because the guard can repeat Stop after
+the shutdown.
 """
 SILENCE_S: Final = 0.25
-"""Longest wait for the second proof at shutdown that the robot is at rest, in s.
+"""Longest wait at shutdown, in s, for the second proof that the robot is at rest.
 
-After the first proof, the driver sends nothing and waits for the second. This one shows that the
-line did not damage the last Stop: a damaged Stop might move the robot. For a slow board, the driver
-waits longer.
+After the first proof, the driver sends nothing more, and waits for the second proof. The second
+proof shows that the last Stop had no bad effect: a Stop that the line has damaged might move the
+robot. For a slow board, the driver waits longer.
 """
 BOTH_PROOFS_S: Final = 2.4
 """Longest time for both proofs at shutdown together, in s, even for a slow board.

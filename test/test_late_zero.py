@@ -2,9 +2,9 @@
 
 """Tests of a zero command that arrives too late while the robot drives to a goal.
 
-Such a command usually ends the goal, although the driver refuses it. There are two reasons why it
-must end the goal: a goal does not expire, and a joystick that is released sends its zero command
-only once.
+The driver refuses the zero command, because it is too old. But the command usually ends the goal.
+Otherwise, the robot would drive on: a goal does not expire, and a joystick that is released sends
+its zero command only once.
 """
 
 import math
@@ -132,7 +132,8 @@ def test_a_late_velocity_and_nan_do_not_end_a_goal(
 def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -> None:
     """The robot drives by cmd_vel, and a zero command arrives late. The driver refuses the zero.
 
-    The velocity stays in effect. It may be newer than the zero, and it expires by itself.
+    The velocity command stays in effect, because it may be newer than the zero. If no other command
+    follows, it expires.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)
@@ -145,10 +146,10 @@ def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -
 def test_a_zero_ends_no_goal_on_a_board_whose_switch_is_on_positional_control(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A zero on cmd_vel does not end a goal if the board's switch is set to positional control.
+    """With the control method ``position``, a zero on cmd_vel does not end a goal.
 
-    ``control_method`` is ``position``, and the robot drives to a goal. With this control method,
-    the driver refuses all commands on cmd_vel. So the goal stays in effect.
+    The board's switch is set to positional control, and the robot drives to a goal. With this
+    control method, the driver refuses all commands on cmd_vel. So the goal stays in effect.
     """
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()

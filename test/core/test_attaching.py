@@ -239,8 +239,8 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
     """The odometry counts how often its frame is moved relative to the board's earth frame.
 
-    A reset, for example, moves the odometry frame. Displacements and usual poses are not counted,
-    because they do not make old goals invalid.
+    Such a move makes the goals from before it invalid. A reset, for example, moves the odometry
+    frame. Displacements and usual poses do not move it, so they are not counted.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))

@@ -2,9 +2,9 @@
 
 """What the driver writes in a scene, which is a script of commands and requests.
 
-In one scene, the writes depend only on the states that the board reports. A ``Course`` has the
-writes for one sequence of states. The writes are computed once, and used in all trials of the scene
-with these states.
+The writes in a scene depend only on the states that the board reports. A ``Course`` has the writes
+for one sequence of states. The writes of a course are computed once, and used in all trials of the
+scene in which the board reports this sequence.
 """
 
 from dataclasses import dataclass

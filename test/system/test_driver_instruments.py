@@ -126,8 +126,8 @@ def test_the_bias_is_what_was_set_last(
 ) -> None:
     """The driver uses the gyro bias that was set last.
 
-    The driver has refined the gyro bias at rest. Then the user sets ``gyro_bias``. The driver uses
-    the user's value, also if the parameter already had this value.
+    While the robot is at rest, the driver refines the gyro bias. Then the user sets ``gyro_bias``.
+    From now on, the driver uses the user's value, even if the parameter already had this value.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))

@@ -57,9 +57,10 @@ def test_a_name_that_is_no_address_is_refused(url: str) -> None:
     ],
 )
 def test_what_may_appear_later_is_not_refused(url: str) -> None:
-    """The device is missing, the host is unknown, or only opening the port can show if it works.
+    """A port is accepted if a later attempt to open it may succeed.
 
-    The port is accepted, because a later attempt to open it may succeed.
+    For example, the device is missing, or the host is unknown. Other ports must be opened to find
+    out whether they work.
     """
     check_address(url)
 

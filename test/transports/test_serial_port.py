@@ -38,8 +38,8 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 ) -> None:
     """For each error that prevents the opening of a port, the message has advice.
 
-    In this test, a substitute for pyserial raises the errors. The kernel cannot cause all of them,
-    because it does not refuse access to root.
+    In this test, a substitute for pyserial raises the errors. Without it, some errors could not
+    occur: if root runs the test, the kernel refuses no access.
     """
 
     def refuse(*_: object, **__: object) -> None:

@@ -60,7 +60,8 @@ def test_a_read_ends_without_a_packet() -> None:
 def test_a_read_that_waits_can_be_interrupted() -> None:
     """A read waits for data, and another thread interrupts it. The read returns without data.
 
-    If the read continued to wait, closing would wait for a paused board.
+    Closing a transport must interrupt a waiting read. Otherwise, closing would last until the board
+    sends data, and a paused board seldom sends data.
     """
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)

@@ -276,7 +276,7 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget that the front wheel missed its angle, and cancel a requested power-off.
+        """Forget the faults of the front wheel, and cancel a requested power-off.
 
         The driver calls this method whenever it accepts a call of ~/start, even during an e-stop.
         """

@@ -39,13 +39,13 @@ TRIES: Final = 12
 NEAR: Final = 2e-3
 DIGIT: Final = 6e-4
 """``NEAR``, ``DIGIT``: tolerances for the comparison of a number that was written to the board with
-the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute. The larger one
-applies, because boards print few digits."""
+the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute. The comparison uses
+the larger one: the board prints few digits, so the relative error of a small number can be above
+``NEAR``."""
 HALF: Final = 0.51
-"""Tolerance for the comparison of a number that was written to the board with the number that the
-board reports, in units of the last digit that the board prints. It applies if it is smaller than
-the tolerance from ``NEAR`` and ``DIGIT``. It is a little more than half a unit, because the board's
-numbers have single precision."""
+"""Another tolerance for the same comparison, in units of the last digit that the board prints. The
+comparison uses it if it is smaller than the tolerance from ``NEAR`` and ``DIGIT``. It is a little
+more than half a unit, because the board's numbers have single precision."""
 
 
 class Configuration:

@@ -127,9 +127,9 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """Reason why the robot must not be driven now; empty if it may be driven.
+        """Why the robot must not be driven now; empty if it may be driven.
 
-        The reason is that the configuration of a board is still being written.
+        It must not be driven while the configuration of a board is being written.
         """
         for configuration in self.configurations.values():
             if configuration.pending:

@@ -20,8 +20,8 @@ The standard deviation grows with the square root of the distance.
 GYRO_WALK: Final = 0.002
 """Standard deviation in rad of the heading after 1 s of motion.
 
-Motion shakes the gyro. So the standard deviation grows with the square root of the time (random
-walk).
+Motion shakes the gyro, and each shake adds an independent error to the heading (random walk). So
+the standard deviation grows with the square root of the time.
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that is measured only by the right wheel."""
@@ -46,17 +46,17 @@ smaller turn, the value is multiplied by the angle in rad.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Ratio of two errors of a turn that is computed from the commands: random to constant error.
+"""Random error of a turn that is computed from the commands, as a fraction of its constant error.
 
 Both errors are standard deviations. The constant error comes from the assumed wheel speed ratio, so
 it has the same sign in all intervals between two encoder counts. The random errors of different
 intervals are independent.
 """
 ASTRAY: Final = 0.7
-"""Factor for the error of a driven distance. The error comes from an uncertain heading.
+"""Factor for the error of a driven distance that an uncertain heading causes.
 
-The relative error of the distance is this factor times the variance of the heading (rad²), but at
-most 1. An error of this size is assumed along the motion, and a second one across it.
+This error, as a fraction of the distance, is the factor times the variance of the heading (rad²),
+but at most 1. An error of this size is assumed along the motion, and a second one across it.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
@@ -132,20 +132,20 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the constant heading error of the turns that were computed before this motion.
+        """Store the constant heading error that the robot has at the beginning of a motion.
 
-        Call this when a motion begins. If the server reports the heading during this motion,
-        ``heading_told`` restores the stored error, so the constant error that this motion has added
-        is removed.
+        Call this when a motion begins. The constant error comes from turns that were computed from
+        the commands. The motion changes this error. If the server reports the heading during the
+        motion, ``heading_told`` sets the error back to the stored value.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
         """Remove the constant heading error of this motion, because the server reports the heading.
 
-        Before, the turn of this motion was computed from the commands. Two errors stay in the
-        covariance: the random heading error, and the position error that the constant heading error
-        has caused.
+        Until this report, the turn of the motion was computed from the commands, which caused the
+        error. Two errors stay in the covariance: the random heading error, and the position error
+        that the constant heading error has caused.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -176,10 +176,10 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Use the error of the server's recorded angle as the heading error of the last turn.
+        """Replace the heading error of the last turn, because the server's record has arrived.
 
-        Until now, the heading error was that of the angle that the wheel measured. The recorded
-        angle comes from the gyro. Call this before the position changes.
+        The old error is that of the angle that the wheel measured. The new error is that of the
+        recorded angle, which comes from the gyro. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

@@ -11,7 +11,8 @@ from typing import Final
 from omnibot_driver.core.mart.doubt import CLOCK_S
 
 WINDOW_S, SPREADS = 0.35, 4
-"""Speeds are averaged over WINDOW_S (s), or SPREADS times a reply's time uncertainty if longer."""
+"""Speeds are averaged over WINDOW_S (s), or over SPREADS times a reply's time uncertainty if this
+time is longer."""
 LEAST_S: Final = 0.05
 """Least time in s that is assumed between two counts, when a speed is computed from them."""
 

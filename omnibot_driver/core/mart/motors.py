@@ -99,8 +99,9 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of the motors' speeds (left / right) if each motor has ``units``.
 
-        A ``MotorLine`` can be wrong, because the network may have lost or duplicated a request to
-        change the speed. Therefore, the ratio is limited to ``motor_balance`` ± MOST_UNEQUAL.
+        The ratio is computed from what the driver has learned (``MotorLine``). This can be wrong,
+        because the network may have lost or duplicated a request to change the speed. Therefore,
+        the ratio is limited to ``motor_balance`` ± MOST_UNEQUAL.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
@@ -132,8 +133,8 @@ def _units(lines: Lines, speed: float) -> int:
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
     """Learn from a turn on the spot in which both motors had ``units``.
 
-    ``speed``: the mean of both motors' speeds. It does not show the speed of each motor, so both
-    motor lines change by the same amounts.
+    ``speed``: the mean of both motors' speeds. The mean does not show the speed of each motor. So
+    slope and offset change by the same amounts in both motor lines.
     """
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2

@@ -24,8 +24,8 @@ from omnibot_driver.core.mart.words import Request
 UNLIKELY: Final = 1 / 3
 """Assumed error of the odometry if the server may have run a move twice, but probably has not.
 
-It is a standard deviation, as a fraction of the move. If the second run has really happened, the
-error is the whole move. This is three standard deviations.
+It is a standard deviation, as a fraction of the move. If the server has run the move twice, the
+true error is the whole move, which is three of these standard deviations.
 """
 RAN_TWICE: Final = (
     "the network has delivered a controlled move twice, and the driver has stopped the second run"
@@ -127,9 +127,10 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn on a good network, the driver first downloads the server's record of the turn,
-        if it still needs records, and if no other job is in progress. It then learns from this
-        record, because the record is more exact than the wheel's measurement.
+        The server's record of a turn is more exact than the wheel's measurement. So after a turn,
+        the driver downloads the record, and learns from it later. It learns from the wheel's
+        measurement at once in three cases: the network is bad, the driver needs no more records, or
+        another job is in progress.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -214,10 +215,12 @@ class Moves(Asking):
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
         """Return whether the driver may have stopped a second run of a controlled move.
 
-        The result is False in two cases. In the first case, the driver has sent no stop after the
-        move. In the second case, the move was complete, and the server answered again very soon: it
-        cannot have run the move a second time, because a second run would have delayed the answer
-        more, whether a stop ended this run or it ended by itself.
+        The result is False in two cases:
+
+        * The driver has sent no stop after the move.
+        * The move was complete, and the server answered again very soon. A second run would have
+          delayed this answer: a stop of the run takes at least ``LEAST_STOP_S``, and a run that
+          ends by itself takes about as long as the move.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

@@ -35,7 +35,7 @@ The value applies to the time before the first heading of the drive.
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
 ACCELERATION_RADPS2: Final = 3.0
-"""Standard deviation of the turn's acceleration since the last encoder count, in rad/s²."""
+"""Standard deviation of the angular acceleration since the last encoder count, in rad/s²."""
 FRESH_S: Final = 0.2
 """Age of the last heading, in s, up to which the measured turn rate is valid."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
@@ -171,10 +171,10 @@ class Reckoning(CorrectedPose):
         return wrong_rad
 
     def _doubt_unread_turn(self) -> None:
-        """Add an error to the pose: the robot may have turned since the last heading was read.
+        """Add an error to the pose at the end of a forward drive (RM) whose last heading is old.
 
-        This method is called at the end of a forward drive (RM) if no heading was read after the
-        robot was stopped.
+        The heading is old if none was read after the robot was stopped. The robot may have turned
+        since the last heading was read.
         """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)
@@ -243,9 +243,9 @@ class Reckoning(CorrectedPose):
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
         As long as the start command may have been lost, the last encoder count may be from before
-        the start. So the pose does not include this count. If the count is from after the start,
-        however, the pose lacks the motion that this property returns. If there is no such count,
-        both values are zero.
+        the start, or it may show a motion after the start. The pose assumes that it is from before
+        the start. This property returns the motion that it otherwise shows. If there is no such
+        count, both values are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

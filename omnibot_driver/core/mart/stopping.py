@@ -54,11 +54,12 @@ later: before its reply, it waits 0.75 s for the robot to stop.
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
-    """Return whether a motion failed only because the wheels turned too long after the motion.
+    """Return whether a motion failed only because the wheels stopped too late.
 
     The motors are off after this failure. If the motion is a controlled turn, the server may report
-    the failure with a wrong text: that the turn has not begun. But a turn that lasted longer than
-    ``NO_START_S`` has certainly begun. So the text then means that the wheels turned too long.
+    the failure with a wrong text: that the turn has not begun. If the turn lasted longer than
+    ``NO_START_S``, it has certainly begun. So this text then means that the wheels stopped too
+    late.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """
@@ -187,9 +188,10 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        Up to ``owed`` doubtful replies may be late replies to earlier requests. If no more doubtful
-        replies have come, the value is None. Otherwise, it is the last doubtful reply with a
-        plausible number. If no number is plausible, it is the last doubtful reply.
+        The replies to ``owed`` earlier requests may still come late. If there are at most ``owed``
+        doubtful replies, all of them may be such late replies, and the value is None. If there are
+        more, the value is the last doubtful reply with a plausible number. If no number is
+        plausible, it is the last doubtful reply.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -29,17 +29,19 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""Factor for the largest recent change between two readings. Only a change that is larger than
-this factor times the largest recent change can be a spike."""
+"""Limit for a change between two readings, as a multiple of the largest recent change
+(``_restless``). Only a larger change can be a spike."""
 CALMING: Final = 0.95
 """Factor by which ``_restless``, the largest recent change, is reduced with each reading. After
 20 readings, a third of it is left."""
 STILL: Final = 0.08
-"""Largest fraction of a spike that remains in the next IMU reading. If more than this fraction of
-an implausible change remains, the change was not a spike.
+"""Limit for spikes of the IMU, as a fraction of the spike's size.
 
-This fraction is also used to find out whether only one value of a reading has changed. Then all
-other values have changed by at most this fraction of the largest change.
+After a spike, the next reading differs from the reading before the spike by at most this fraction.
+If it differs by more, the change was not a spike.
+
+The same fraction decides whether only one value of a reading has changed: all other values must
+have changed by at most this fraction of the largest change.
 """
 END_OF_SCALE: Final = 0.99996
 """Fraction of the accelerometer's full scale. A reading of at least this fraction is regarded as
@@ -52,8 +54,8 @@ ALIKE: Final = 2.0
 the filter does not compare the two displacements. Otherwise, even a steady motion would look
 like a change."""
 BACK: Final = 0.25
-"""Largest fraction of a displacement's spike that remains in the next displacement. If more than
-this fraction of an implausible change remains, the change was not a spike."""
+"""The same limit as ``STILL``, for displacements: after a spike, the next displacement differs from
+the displacement before the spike by at most this fraction of the spike's size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,10 +93,10 @@ class OutlierFilter:
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: whether the board corrects its own odometry. A correction can look like an
-      impossible motion. So if this is True, the filter does not reject an impossible but finite
-      displacement. It passes the displacement on, with ``measured`` set to False. If the duration
-      of the displacement is known and not 0, it also sets ``possible`` to False.
+    * ``corrected``: whether the board corrects its own odometry. Such a correction can look like an
+      impossible motion. So if this is True, the filter passes an impossible displacement on if it
+      is finite. In this displacement, it sets ``measured`` to False. If the duration is known and
+      not 0, it also sets ``possible`` to False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -219,9 +221,10 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading. If it is a pose, ``lost`` also counts the rejected displacements.
+        """Return the reading. If it is a pose, add the rejected displacements to its ``lost``.
 
-        The pose includes the motion of these displacements, so their motion is not lost.
+        A pose includes the motion of all displacements before it. So the rejected displacements are
+        counted like those that were lost on the line.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -247,9 +250,10 @@ class OutlierFilter:
 class _Spikes:
     """Finds spikes in a series of readings. Each reading is a list of values.
 
-    Each value is given in units of a change that is always allowed between two readings.
+    The values are scaled so that a change of 1 between two readings is always plausible.
 
-    * ``left``: largest fraction of a spike that remains in the next reading.
+    * ``left``: largest difference between the readings before and after a spike, as a fraction of
+      the spike's size.
     * ``knocked``: number of values, from the beginning of the list, that can change implausibly
       much because something knocks against the robot. Such a change may be a spike only if one
       flipped bit explains it.
@@ -269,9 +273,10 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Return whether the previous values were a spike, and whether the new values leap.
+        """Return whether the values of the last call were a spike, and whether the new values leap.
 
-        Values leap if they change implausibly much. The next values show whether they are a spike.
+        Values leap if they change implausibly much. The next call then shows whether they were a
+        spike.
 
         ``periods``: number of sampling periods between the previous and the new values.
 
@@ -308,8 +313,8 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether one flipped bit can explain a change.
 
-        ``step``: size of the change. It need not be exactly the value of a bit, because the
-        readings vary: the recent variation is tolerated.
+        ``step``: size of the change. It may differ from the value of a bit by ``OUT_OF_PROPORTION``
+        times the largest recent change, because the readings vary.
 
         ``value``: magnitude after the change. If it is at the end of the scale, the result is
         False, because a knock against the robot can also cause such a value.

@@ -29,16 +29,16 @@ After this time, the driver assumes the heading of the last pose, although no ot
 confirmed it. If no pose has arrived, the driver assumes heading 0.
 """
 LONG_GAP_S: Final = 1.0
-"""Duration of lost displacements, in s, above which the next displacements wait for a pose that
-shows the lost motion."""
+"""If displacements are lost for more than this time, in s, the next displacements wait for a pose
+of the board. The pose shows the lost motion."""
 POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
-Only lost displacements make the board's heading uncertain. The heading remains uncertain until a
-pose of the board shows the lost motion.
+It is the standard deviation of the turn in lost displacements. When a pose of the board has shown
+the lost motion, the heading is known again.
 """
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
@@ -235,20 +235,19 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the odometry must adopt the board's frame in which this pose is given.
 
-        The odometry must adopt a frame at the beginning, and again if the board has a new frame
-        after a suspected restart. A pose is *confirmed* (``confirmed``) if it agrees with the last
-        doubted pose. The *old frame* is the frame from before the suspected restart.
+        A pose is *confirmed* (``confirmed``) if it agrees with the last doubted pose.
 
-        * While no frame was adopted or assumed: the result is True if the pose is confirmed.
-        * Without a suspected restart: the result is False.
-        * After a suspected restart, the pose fits the motion since the restart, and fits it better
-          than the old frame: the frame is new, and the result is True.
-        * After a suspected restart, the pose fits the old frame: the suspicion ends, and the result
-          is False.
-        * After a suspected restart, the pose does not fit the old frame, but it is confirmed, and
-          the robot can have reached it in the old frame: the suspicion ends, and the result is
-          False.
-        * After a suspected restart, any other pose: the result is True if the pose is confirmed.
+        While no frame was adopted or assumed, the result is True if the pose is confirmed.
+        Afterwards, the odometry adopts another frame only after a suspected restart of the board.
+        The *old frame* is the frame from before the suspected restart. The first rule that applies
+        gives the result:
+
+        * There is no suspected restart: False.
+        * The pose fits the motion since the restart, and fits it better than the old frame: True.
+        * The pose fits the old frame: False, and the suspicion ends.
+        * The pose is confirmed, and the robot can have reached it in the old frame: False, and the
+          suspicion ends.
+        * In all other cases: True if the pose is confirmed.
         """
         if self._board is None:
             return confirmed

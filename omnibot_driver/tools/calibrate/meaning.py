@@ -26,11 +26,11 @@ STOPS_PART: Final = 0.5
 The early and the late speed are those of the first and the second half of a drive.
 """
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Limits of the ratio of two speeds. The command for the second speed is twice the command for the
-first one.
+"""Limits for two speeds: of a drive, and of a second drive with twice the command.
 
-``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: ratio up to which the
-speed is regarded as unchanged. The limits allow for friction and rounding.
+The limits apply to the second speed divided by the first one. ``DOUBLED``: range in which the speed
+is regarded as doubled. ``UNCHANGED``: largest value for which the speed is regarded as unchanged.
+The limits allow for friction and rounding.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
@@ -122,12 +122,12 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Return whether the driver's frame of the odometry deltas, "earth" or "body", is right.
+    """Return whether the driver uses the right frame of the odometry deltas ("earth" or "body").
 
-    ``before``, ``after``: two motions by the same command. Between them, the robot turned by
+    ``before``, ``after``: two drives by the same command. Between them, the robot turned by
     ``turned_rad``.
 
-    Raises ToolError if the motions fit neither frame.
+    Raises ToolError if the drives fit neither frame.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

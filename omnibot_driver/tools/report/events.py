@@ -16,11 +16,11 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which /diagnostics still shows the last state in the log, if the driver runs.
+"""Time in s after which /diagnostics shows whether the driver still ran at the end of a log.
 
-The time is counted from the beginning of this state. The last state "disconnected" has two possible
-reasons: the driver has ended, or it has lost its board and still runs. If /diagnostics does not
-show the state after this time, the driver has ended.
+The last state in the log may be "disconnected" for two reasons: the driver has ended, or it has
+lost its board and still runs. A driver that runs still shows this state on /diagnostics, more than
+``SILENT_S`` after the state began. If /diagnostics does not show it then, the driver has ended.
 """
 
 

@@ -106,8 +106,8 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
     """After a request for a pause or a reset, the driver sends no motion frame.
 
-    It sends no motion frame even if the request does not reach the board, and the robot therefore
-    drives on.
+    In this test, the request does not reach the board, so the robot drives on. Even then, the
+    driver sends no motion frame.
     """
     bench.drive(0.4)
     start = len(bench.written)

@@ -117,9 +117,11 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
     """The clock becomes right, although its first line was read late.
 
-    Afterwards, every read brings two lines, which were sent 20 ms apart. At first, the clock takes
-    the delay of the first line for the usual delay. So the newer line of each read seems to arrive
-    too early. The clock rejects the times of at most three lines, and then it is right.
+    At first, the clock takes the delay of this line for the usual delay. Later lines that are read
+    with less delay seem to arrive too early. The clock rejects the times of at most three lines,
+    and then it is right.
+
+    Each later read brings two lines, which were sent 20 ms apart.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -249,8 +251,9 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
     """Stamps must increase only among extra readings of the same kind.
 
-    A reading has an earlier stamp than the reading before it, but this other reading is of another
-    kind. So the driver does not change the stamp.
+    The second reading has an earlier stamp than the first one. It is of another kind, so the driver
+    does not change its stamp. The third reading has the kind and the stamp of the first one, so the
+    driver makes its stamp later.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -314,8 +317,8 @@ def numbered() -> Bench:
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
     """Return a pair for each published sample: the cycles of its gyro and its acceleration line.
 
-    A cycle is a period of the board. It is given as its number divided by 1000, as in the lines of
-    the bench from ``numbered``.
+    A cycle is a period of the board. The lines of a bench from ``numbered`` contain the number of
+    the cycle, divided by 1000. The pairs contain the same values.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

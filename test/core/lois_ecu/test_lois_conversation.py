@@ -179,11 +179,11 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 @pytest.mark.slow
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """The driver sends RPM 0/0 after a Stop, because otherwise a slower set-point starts no wheel.
+    """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    The robot drives at 30 RPM and is stopped. The firmware keeps the last measured speed, and only
-    RPM 0/0 would clear it. In this test, nothing sends RPM 0/0. Then a set-point of 8 RPM, without
-    feed-forward, does not start the wheels.
+    The robot drives at 30 RPM and is stopped. The firmware keeps the last measured speed until it
+    receives RPM 0/0. The driver usually sends RPM 0/0, but this test does not. Then a set-point of
+    8 RPM, without feed-forward, does not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -245,8 +245,9 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
     """While a board with the public firmware sends a record, its clock stops for 0.12 s.
 
-    The driver does not regard the tick reports after the record as late. So ``odom`` does not jump
-    some seconds later, even if lines of the record are lost.
+    After the record, the tick reports are late by this clock. The driver knows about the stop, and
+    does not regard these reports as read late. Otherwise, ``odom`` would jump some seconds later.
+    This also holds if lines of the record are lost.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)

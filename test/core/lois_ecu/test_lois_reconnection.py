@@ -69,9 +69,9 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """The covariance stays finite if a robot starts backward just after a reconnect.
+    """A robot starts backward just after a reconnect. The covariance stays finite.
 
-    The start is between the first two odometry reports of the new connection.
+    The robot starts between the first two odometry reports of the new connection.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)

@@ -23,9 +23,10 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The board obeys set-points even while the user holds the e-stop button.
+    """The user holds the board's e-stop button. The driver does not release the e-stop.
 
-    So the driver keeps the e-stop until the button is released.
+    The board itself would obey set-points even while the button is held. So the driver must keep
+    the e-stop latched until the button is released.
     """
     bench = Bench(firmware)
     bench.drive_on()
@@ -191,10 +192,10 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """For 1.2 s the board sends only a record while the robot drives.
+    """For 1.2 s the board sends only a record while the robot drives. The record arrives complete.
 
-    The record arrives complete. The encoders have 120 ticks per turn, so that the record of 1024
-    samples is full soon.
+    The record has 1024 samples, one for each encoder tick. The encoders have 120 ticks per turn, so
+    the record is soon full.
     """
     bench = Bench(firmware, LoisEcuSettings(ticks_per_revolution=120), steps=120)
     bench.drive_on(0.6, 2.0)
@@ -367,8 +368,9 @@ def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped(firmware: str) -> None:
     """A robot drives at 0.8 m/s. The command is 0.2 m/s, and ``fastest_linear_speed`` is 0.6 m/s.
 
-    So all displacements seem impossible. A single impossible displacement could be a correction of
-    the odometry. After four of them in a row, the driver stops the robot.
+    So the robot seems faster than it can be in each displacement. After one such displacement, the
+    driver does not stop the robot, because the board may have corrected its odometry. After four in
+    a row, the driver stops the robot.
     """
     bench = Bench(firmware)
     bench.session.configure(replace(SETTINGS, motion=MotionLimits(fastest_mps=0.6)), bench.now)

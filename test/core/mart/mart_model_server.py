@@ -113,8 +113,9 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 def servers() -> dict[Server, tuple[str, ...]]:
     """Return all states that the server can reach if no datagram is lost.
 
-    The keys are the states. The value of each key lists the steps that lead to this state. One of
-    the steps is a failure of the IMU, but not during a controlled move.
+    The keys are the states. Each value is the sequence of steps from the initial state to this
+    state. A step is a command, or a failure of the IMU. The IMU does not fail during a controlled
+    move.
     """
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}

@@ -46,10 +46,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """The IMU dies in a motion and works again later, but the server's stop port stays hung.
 
-    The driver refuses motion until the heading shows that the server was restarted. Then the
-    network fails for a time. Meanwhile, the heading changes, because it drifts or because a user
-    turns the robot by hand. This change is not a sign of a restart, so the driver still refuses
-    motion.
+    The driver refuses motion until the server is restarted. Then the network fails for a time.
+    Meanwhile, the heading changes, because it drifts or because a user turns the robot by hand. A
+    restart sets the heading to zero, but another change of the heading does not show a restart. So
+    the driver still refuses motion.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -95,8 +95,8 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 ) -> None:
     """A driver starts while the server executes RM or B with a dead IMU.
 
-    The server hangs in the first stop command, so the driver uses the stop port, which then hangs,
-    too. When the IMU works again, the driver refuses motion.
+    The driver sends a stop command, and the server hangs. The driver then uses the stop port, which
+    hangs, too. When the IMU works again, the driver refuses motion.
 
     ``wait_s``: time in s from the driver's start until the IMU works again.
     """

@@ -115,8 +115,8 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
     """The network delivers the command of a controlled move twice. The second copy comes late.
 
-    The first move ends. Then the server executes the late copy, so the robot makes a second move,
-    and the server does not answer it. An e-stop ends the second move within 1 s.
+    When the first move has ended, the server executes the late copy, without a reply. So the robot
+    makes a second move. The user latches the e-stop, and the robot is at rest within 1 s.
     """
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)

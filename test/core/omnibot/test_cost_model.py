@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the cost of a frame. A frame that fits the frames before it badly has a high cost."""
+"""Tests of the cost of a frame. The cost is high if the frame contradicts the frames before it."""
 
 import pytest
 

@@ -108,9 +108,9 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """A random byte is inserted into a stream. In some streams, gyro values look like headers.
+    """A random byte is inserted into a stream. At most 1 in 30 such bytes makes a false frame.
 
-    At most 1 in 30 inserted bytes makes a false frame.
+    The limit also holds for streams in which gyro values look like headers.
     """
     stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)

@@ -287,8 +287,8 @@ def test_the_two_clocks_run_apart() -> None:
 def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
     """The clock of one Teensy is fast, that of the other Teensy is slow.
 
-    Each Teensy sends a heartbeat every 0.4 s by its own clock. So the time in each heartbeat is a
-    multiple of 0.4 s, within a millisecond, the duration of a cycle.
+    Each Teensy sends a heartbeat every 0.4 s by its own clock. So the time in a heartbeat is a
+    multiple of 0.4 s, or up to a millisecond later. A millisecond is the duration of a cycle.
     """
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.1)

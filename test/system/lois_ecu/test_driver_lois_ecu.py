@@ -51,9 +51,10 @@ def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board
 ) -> None:
     """The robot drives 0.6 m and stops when the commands end. Odometry is within 3 cm of the truth.
 
-    The driver replaces the board's own controller gains, because with these the robot would swerve.
+    The driver replaces the board's own controller gains, because with the board's own gains the
+    robot would swerve.
 
-    Then the board restarts. The driver writes the gains again, and the robot obeys new commands.
+    Then the board restarts. The driver writes its gains again, and the robot obeys new commands.
     The pose in odom continues from its value before the restart. At the end, the error of the pose
     is at most 8 cm, or at most 3 sigma if this is more.
     """
