@@ -50,8 +50,8 @@ robot. For a slow board, the driver waits longer.
 BOTH_PROOFS_S: Final = 2.4
 """Longest time for both proofs at shutdown together, in s, even for a slow board.
 
-The driver's process ends itself after ``driver.LONGEST_END_S``. Within this limit, there must still
-be time for the guard to repeat Stop if there is no proof.
+The driver's process ends itself after ``driver.LONGEST_END_S``. If there is no proof, the guard
+must have time to repeat Stop before this end.
 """
 
 T = TypeVar("T")

@@ -235,8 +235,8 @@ class FejemisBoard(Board):
     def wanted(self, *, estop: bool) -> None:
         """Latch or release the board's e-stop, because the driver has a new order for the robot.
 
-        ``estop``: whether the order is an emergency stop. It latches the e-stop. Any other order
-        releases it.
+        ``estop``: whether the order is an emergency stop, which latches the e-stop. Any other order
+        releases the e-stop.
         """
         if not estop:
             self._obedience.release(self._now)

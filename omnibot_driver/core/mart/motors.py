@@ -25,8 +25,8 @@ Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Smallest number of motor units for which the ratio of the two motors' speeds is computed.
 
-For fewer units, the driver uses the ratio at ``BALANCE_UNITS``. At low speeds, an error of a
-``MotorLine`` would change the ratio too much.
+For fewer units, the driver uses the ratio at ``BALANCE_UNITS``, because an error of a ``MotorLine``
+changes the ratio too much at low speeds.
 """
 
 

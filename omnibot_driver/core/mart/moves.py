@@ -44,7 +44,7 @@ DISCARDED: Final = "; the goal of cmd_pose is discarded: remove the cause, then 
 OFF_COURSE_RAD: Final = 0.5
 """Assumed standard deviation, in rad, of the angle by which the robot turns in a failed move.
 
-A move fails if one wheel does not turn. The robot then turns. The server reports only the failure,
+If one wheel does not turn, the robot turns and the move fails. The server reports only the failure,
 and not the angle.
 """
 LEAST_STOP_S: Final = 0.3

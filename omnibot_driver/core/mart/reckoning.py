@@ -103,7 +103,7 @@ class Reckoning(CorrectedPose):
         self.heading.may_begin_anew = True
 
     def begin(self, motion: Motion, now: float) -> None:
-        """Record that the driver has started a motion. For it, the encoder count begins at 0."""
+        """Record that the driver has started a motion. Its encoder count begins at 0."""
         if motion is not Motion.REFERENCE and self.heading.from_s < self._stood_s:
             self.heading.forget()  # on some servers, the last motion has changed the heading
         self.motion, self.stands = motion, False

@@ -307,7 +307,7 @@ class Odometry:
         """Accept a pose of the board, or keep it as ``doubted`` until the next pose.
 
         A pose is accepted if it is reachable and expected, or if it confirms the last doubted pose.
-        A confirmed pose may be unreachable for the robot. Then the board's frame has moved, not the
+        If the robot cannot have reached a confirmed pose, the board's frame has moved, and not the
         robot.
         """
         assert self._board is not None
