@@ -18,12 +18,12 @@ def write_whole(
 ) -> bool:
     """Write a text file in UTF-8, and create its folder if needed.
 
-    An existing file is replaced. Return whether the new file exists. Raises OSError.
+    An existing file is replaced. Return whether the file was written. Raises OSError.
 
     ``write``: function that writes the content to the open file. Line ends are not converted.
 
     ``wanted``: function that is called after the content is written. If it returns False, the new
-    content is discarded, and an existing file stays as it was.
+    content is discarded, and an existing file stays as it was. The result is then False.
     """
     import tempfile  # takes 1 MB, and few drivers ever write a file
 

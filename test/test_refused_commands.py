@@ -101,11 +101,11 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A refused command does not start a refusal again that has already ended.
+    """A refused command does not bring back a refusal of motion that has already ended.
 
-    The motion monitor has stopped the robot, and the sender has paused for ``cmd_vel_timeout``. So
-    motion is allowed again. Then a late command comes, and is refused because it is late. The
-    driver obeys the next command.
+    The motion monitor has stopped the robot. Motion is refused until the sender has paused for
+    ``cmd_vel_timeout``. After this pause, a late command comes, and is refused because it is late.
+    The driver obeys the next command.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

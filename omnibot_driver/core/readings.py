@@ -17,7 +17,7 @@ Vector3 = tuple[float, float, float]
 class Unstamped:
     """A reading whose ROS message has no stamp, such as a state or the result of a request.
 
-    It is published even before simulated time has begun, because it needs no stamp.
+    Since it needs no stamp, it is published even before simulated time has begun.
     """
 
 

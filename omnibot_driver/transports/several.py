@@ -207,9 +207,9 @@ class Several:
     def _write_what_waits(self, now: float) -> None:
         """Write the waiting bytes.
 
-        If a line does not accept all of its bytes, ``poll`` reports when it accepts more. A line
-        that has had waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) without a break is regarded as
-        missing.
+        If a line does not accept all of its waiting bytes, ``poll`` reports when it accepts more.
+        If a line has had waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) without a break, it is
+        regarded as missing.
         """
         with self._writing:
             for line in self._lines:

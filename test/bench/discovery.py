@@ -21,10 +21,10 @@ PORT: Final = "11811"
 WINDOW_S: Final = 30.0
 """Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Time in s for which the program waits until the drivers have started.
+"""Time in s for which the program waits twice.
 
-After the search for the drivers, it waits as long again until the search's last packets have
-arrived. No event reports the last packet, so the time is fixed.
+First it waits until the drivers have started. After the search for the drivers, it waits until the
+last packets of the search have arrived. No event reports the last packet, so the time is fixed.
 """
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """

@@ -94,7 +94,8 @@ def heading(yaw: float) -> PoseReading:
 def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
     """Deliver a pose of the board twice; return the odometry estimates of the second delivery.
 
-    The odometry accepts the pose only when it comes for the second time.
+    The odometry accepts the pose only when it comes for the second time. The first delivery gives
+    no estimates.
     """
     assert odometry.settle(pose) == []
     return odometry.settle(pose)

@@ -87,9 +87,9 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """The board computes odometry itself. The driver publishes it at the board's rate.
+    """A board sends displacements and its own odometry. The driver publishes only this odometry.
 
-    The twist has the variances that the board reports.
+    It publishes at the board's rate. The twist has the variances that the board reports.
     """
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)

@@ -21,10 +21,10 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """The user pauses a driving robot. The driver sends Stop, and then P once.
+    """The user pauses a driving robot. The driver sends Stop.
 
-    It sends P only after new data has shown that the board runs. The «Paused» text of the board
-    confirms the pause.
+    When new data has shown that the board still runs, the driver sends P once. The «Paused» text of
+    the board then confirms the pause.
     """
     bench.drive(0.5)
     bench.run(0.3)
@@ -85,9 +85,9 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 ) -> None:
     """Another program pauses the board while older data is still on its way to the driver.
 
-    The user requests a pause, too. Because of the older data, the driver sends P, which resumes the
-    board. Then the «Paused» text about the other program's pause arrives. The driver does not take
-    it for a confirmation, and sends P again.
+    The user requests a pause, too. The older data seems to show that the board runs, so the driver
+    sends P. This P resumes the board. Then the «Paused» text about the other program's pause
+    arrives. The driver does not take it for a confirmation, and sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

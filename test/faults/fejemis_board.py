@@ -27,7 +27,8 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both simulated Teensys, with the interface of a single board.
 
-    ``tick``: number of the campaign's ticks so far. One of these is ``TICKS`` ticks of the boards.
+    ``tick``: number of the campaign's ticks so far. One tick of the campaign is ``TICKS`` ticks of
+    the boards.
 
     ``received``: motion commands to the drive board, without checksums and padding.
     """

@@ -32,7 +32,7 @@ test_driver_endings and test_driver_guard test other endings.
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """After an end during a drive, the board has received Stop last, and the exit code is right."""
+    """The driver ends during a drive. The board receives Stop last, and the exit code is right."""
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
         assert not rig.findings.take(), rig.driver.output

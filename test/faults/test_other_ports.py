@@ -12,7 +12,7 @@ from stuck import NETWORK
 LEFT_OUT = "socket: the server delays the data to the board"
 """Name of a case that this module omits.
 
-It is similar to the case in which the server delays all data. ``make faults`` runs both cases.
+A similar case is tested: the server delays all data. ``make faults`` runs both cases.
 """
 CASES = {name: case for name, case in NETWORK.items() if name != LEFT_OUT}
 

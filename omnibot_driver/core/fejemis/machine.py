@@ -2,8 +2,8 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Each line for the lift limits the lift's run time. The other lines are repeated, because the board
-does not acknowledge them.
+The board does not acknowledge these lines, so they are repeated. The lines that move the lift are
+an exception: each of them limits the lift's run time.
 """
 
 import math
@@ -166,9 +166,10 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The numbers are chosen so that the checksum detects damage to the line. So the sent voltage may
-    be lower than ``volts``, but it is at least ``LEAST_PART * volts``. Such a voltage exists for
-    all ``volts`` from ``LEAST_VOLTS`` to ``MOST_VOLTS``.
+    With some numbers in the line, the checksum would not detect damage to the line. The driver
+    avoids these numbers. So the sent voltage may be lower than ``volts``, but it is at least
+    ``LEAST_PART * volts``. Such a voltage exists for all ``volts`` from ``LEAST_VOLTS`` to
+    ``MOST_VOLTS``.
     """
     if not volts:
         return OFF[0], 0.0

@@ -27,10 +27,10 @@ turn on the spot may begin. Up to this deviation, other motion may have full spe
 ``STILL_ALIGNED_RAD``: largest deviation, in rad, at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad, that defines the permitted error of
-the body's velocity: the error that this deviation causes at full speed.
+"""Permitted error of the body's velocity, given as a deviation of the front wheel in rad.
 
-If the deviation is larger, the speed is limited so that the error stays within the permitted one.
+It is the error that this deviation from the target angle causes at full speed. If the deviation is
+larger, the driver lowers the speed, so that the error stays within the permitted one.
 """
 
 
@@ -76,7 +76,8 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 def scale(twist: BodyTwist, track_m: float) -> float:
     """Return the factor for speed and turn rate in a motion line (``rc``); 1 for a stop.
 
-    With this factor, the drive board gives its outer wheel the speed that the twist requires.
+    The drive board computes the speed of its outer wheel from the two numbers of the line. With
+    this factor, the result is the speed that the twist requires.
     """
     # The drive board drives its outer wheel at sqrt(v² + w²), and turns about a centre that follows
     # from the measured front angle. The factor makes the root equal to the speed that the outer

@@ -136,9 +136,9 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, the missing data may have arrived without being read. The driver reads this data
-        during the next ``OLDEST_S``. In this time, it does not blame one of the boards for missing
-        data.
+        If so, the driver may be late, and the boards' data may wait to be read. The driver reads
+        this data during the next ``OLDEST_S``. In this time, it does not blame one of the boards
+        for missing data.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

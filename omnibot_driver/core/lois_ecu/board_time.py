@@ -34,8 +34,8 @@ SAME_READ_S: Final = 0.02
 """Tick reports that arrive within this time in s were probably read together, and late. Only
 the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
-"""Margin in s. A tick report is certainly irregular if it is earlier than the fitted clock by more
-than this margin. It is also irregular if its delay exceeds the largest recent delay by more than
+"""Margin in s. The delay of a tick report is irregular in two cases: the report is earlier than the
+fitted clock by more than this margin, or its delay exceeds the largest recent delay by more than
 this margin."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
@@ -56,10 +56,11 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Change of the arrival time minus the board's time since the first tick report, in s.
+        """Two estimates of how much the board's clock has fallen behind since the first tick
+        report, in s: the change of the difference "arrival time minus board's time".
 
-        The list has two estimates of this change. The first one assumes that the board's clock
-        always runs. The second one assumes that this clock stops while the board sends.
+        The first estimate assumes that the board's clock always runs. The second one assumes that
+        this clock stops while the board sends.
         """
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
@@ -89,10 +90,10 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s, and whether this delay is irregular.
 
-        The delay follows from the fitted clock, and is negative if the report seems early. It is
-        irregular if a late read cannot explain it: if it is clearly negative, or much larger than
-        all recent delays. Return 0 and False while too few reports are stored. This method does not
-        store the report.
+        The delay is computed with the fitted clock. It is negative if the report is earlier than
+        this clock says. A delay is irregular if a late read cannot explain it: if it is clearly
+        negative, or much larger than all recent delays. Return 0 and False while too few reports
+        are stored. This method does not store the report.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False
@@ -144,7 +145,7 @@ def _above_line(kept: Sequence[Point]) -> list[float]:
 
 
 def _line_below(kept: Sequence[Point]) -> Point:
-    """Return slope and height of a straight line that lies above no point and touches one point."""
+    """Return slope and height of a straight line that touches a point and has no point below it."""
     half = len(kept) // 2
     points = list(kept)
     # A read may be late but never early, so the line lies below all arrivals. Its slope is that

@@ -12,10 +12,10 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Factor for the largest accepted difference between a heading and the expected heading.
+"""Factor that determines the largest accepted difference of a heading from the expected one.
 
-This difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn`` is the change of the
-odometry's yaw since the last heading, in degrees.
+The largest accepted difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn`` is the
+change of the odometry's yaw since the last heading, in degrees.
 """
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0

@@ -44,14 +44,15 @@ STOPS_S: Final = 1.0
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 """Time in s between the server's first reply and the first query of the battery voltage (VOLTS).
 
-Before this reply, the server was silent, and may have been restarted. The driver needs the voltage
-before the first motion, which begins after STARTS_UP_S.
+VOLTS crashes a server that is starting up, and a server that was silent may have been restarted. So
+the driver does not send VOLTS earlier. It does not send VOLTS later either: it needs the voltage
+before the first motion, which begins STARTS_UP_S after the first reply.
 """
 VOLTS_S: Final = 10.0
-"""Longest delay of a voltage query (VOLTS) after an unanswered request, in s since the last VOLTS.
+"""Time in s since the last voltage query (VOLTS) after which the next one is sent in any case.
 
 VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
-the driver then waits before it sends VOLTS. When this time has passed, it sends VOLTS in any case.
+the driver usually waits after such a request before it sends VOLTS. This time limits the wait.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -77,8 +78,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A motion command or a stop cancels the current job. There is one exception: if ``wanted`` is
-        the present goal again, the download of a turn's record continues.
+        A motion command or a stop cancels the current job. There is one exception: the download of
+        a turn's record is not cancelled by a repetition of the present goal.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -130,7 +131,8 @@ class Pilot(Hearing):
         """Begin a new connection after a long silence, because the server may have been restarted.
 
         Do nothing during a motion or a job. Do nothing either if the server's stop port may hang
-        (``Health.outlived``): when a network failure ends, the port still hangs.
+        (``Health.outlived``): a failure of the network may have caused the silence, and after such
+        a failure, the port still hangs.
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()

@@ -22,22 +22,23 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 OLD_RAD: Final = 0.01
 """Largest difference in rad between two headings that are regarded as the same heading.
 
-A forward drive (RM) sets the server's heading to zero. If the first heading that is reported in the
-RM is nearly the last heading before it, the server may have measured this heading before the RM.
-Its reply may be late.
+A forward drive (RM) sets the server's heading to zero. If the first heading after the start of RM
+is the same as the last heading before RM, it may come from a late reply: the server may have
+measured it before RM.
 """
 MOST_RAD: Final = 1e7
-"""Size in rad from which a reported heading is rejected.
+"""Limit in rad. A reported heading of this size or more is rejected.
 
-The server integrates the turn rate over unsigned milliseconds. If the server's clock was set back,
-the time is negative and becomes huge. The server then reports 1e15 degrees, for example.
+The server integrates the turn rate over time, in unsigned milliseconds. If the server's clock is
+set back, a time step is negative. As an unsigned number, this step is huge, so the server reports
+1e15 degrees, for example.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is predicted after its last report."""
 ODD_TIMES: Final = 3
 """Number of implausible headings in a row. When it is reached, the last of them is accepted."""
 SPREADS: Final = 4
-"""Time over which the turn rate is averaged, as a multiple of the time uncertainty of a reply."""
+"""The turn rate is averaged over ``SPREADS`` times the time uncertainty of a reply."""
 
 
 class RelativeHeading:

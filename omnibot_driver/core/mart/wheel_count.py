@@ -20,13 +20,14 @@ It is DOUBT_M (m) + DOUBT_MPS (m/s) * time. The time is the sum of two times: th
 the last count, and the time uncertainty of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
-"""Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time."""
+"""Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time between them.
+"""
 STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""If this number of counts differ by at most 1 from the count before a start, the start was
-lost."""
+"""Number of counts after which the driver regards a start command as lost. It includes only counts
+that differ by at most 1 from the last count before the command."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +54,8 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last reported count, if it differs by at most 1 from the count before the start
-    command; otherwise 0. A count that differs so little shows that the start command may be lost.
+    ``maybe``: the last reported count, if the start command may be lost; otherwise 0. The command
+    may be lost if this count differs by at most 1 from the count before the command.
     """
 
     def __init__(self) -> None:
@@ -89,8 +90,8 @@ class WheelCount:
         If the server has acknowledged the motion, nothing changes. If it has not, there are two
         cases:
 
-        - A count of the motion has come. The motion had begun, so the server was restarted. The
-          pose already includes the counts of the motion.
+        - A count of the motion has come, so the motion had begun. A server that no longer knows of
+          it was restarted. The pose already includes the counts of the motion.
         - No count of the motion has come. The motion did not begin, and the count continues from
           its value before the start command.
         """
@@ -178,10 +179,10 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether an uncertain count is a wrong reply: it contradicts the last count.
+        """Return whether an uncertain count contradicts the last count, and so is a wrong reply.
 
-        An uncertain count contradicts the last count of this motion if it is clearly nearer to
-        zero, or if it has the other sign.
+        It contradicts the last count of this motion if it is clearly nearer to zero than that
+        count, or if it has the other sign.
         """
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:

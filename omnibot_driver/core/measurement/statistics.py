@@ -23,9 +23,9 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. From this period follows how many IMU readings the
-      board has sent during a displacement. If fewer have arrived, the missing ones are counted as
-      lost. The period is None if each IMU reading itself says how many were lost (``lost``).
+    * ``imu_period_s``: period of the IMU in s. With it, the driver computes how many IMU readings
+      the board has sent during a displacement. If fewer have arrived, the missing ones are counted
+      as lost. The period is None if each IMU reading itself says how many were lost (``lost``).
     """
 
     imu_period_s: float | None = None
@@ -42,8 +42,8 @@ class StreamStatistics:
     reads: int = 0
     """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum of delays in s: for each of the ``reads``, the age of its newest sample. An age may
-    be a few microseconds below 0, because stamps must increase."""
+    """Sum of delays in s: for each of the ``reads``, the age of its newest sample. Each stamp must
+    be later than the stamp before it, so an age may be a few microseconds below 0."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0
@@ -54,13 +54,17 @@ class StreamStatistics:
     _sent_imu: int | None = field(default=None, repr=False)
     """Number of IMU readings that the board had sent before the last displacement.
 
-    It is the sum that ``imu`` and ``lost_imu`` had at that displacement, plus the readings of the
-    displacements that were lost before a pose. It is None if the number is unknown.
+    It is the value of ``imu + lost_imu`` at the time of that displacement. If a later pose shows
+    that further displacements are lost, their IMU readings are added. None: the number is unknown.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
-        """Count the readings of one read. Add ``delay_s``, the age of its newest sample in s."""
+        """Count the readings of one read. ``delay_s``: age of its newest sample, in s.
+
+        If the last reading is an IMU sample or a displacement, the age is added to the sum of
+        delays.
+        """
         if isinstance(readings[-1], (ImuReading, DisplacementReading)):
             self.reads += 1
             self.delay_s += delay_s

@@ -41,7 +41,7 @@ If the robot moves later, the cause is not a lost Stop but, for example, a push.
 """
 STOPS_S: Final = 5.0
 """Time in s for which the command policy sends Stop again and again to a robot that keeps moving.
-The value is the default of the policy."""
+It is equal to the default of this policy."""
 
 REFUSED_IN_A_ROW: Final = 4
 COSINE_60: Final = 0.5
@@ -228,10 +228,12 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot whose motion does not fit its commands.
 
-        Such a robot is too fast, or it moves in the wrong direction. The linear velocity is too
-        fast if its direction is within 60° of a set-point's direction, or if the heading is
-        unknown. Otherwise its direction is wrong. The yaw rate is too fast if it has the same sign
-        as a set-point's yaw rate. Otherwise its direction is wrong.
+        Such a robot is too fast, or it moves in the wrong direction:
+
+        - The linear velocity is too fast if its direction is within 60° of a set-point's direction,
+          or if the heading is unknown. In all other cases, its direction is wrong.
+        - The yaw rate is too fast if it has the same sign as a set-point's yaw rate. In all other
+          cases, the robot turns in the wrong direction.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -246,9 +248,9 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command, and Stop is due; otherwise None.
 
-        ``begins``: whether the following error exceeds its limit now. If it does, the first Stop is
-        due. The robot may continue to move, for example because somebody pushes it. Then Stop is
-        due again, after longer and longer times.
+        ``begins``: whether the following error exceeds its limit now. The first Stop is due when
+        this is true. If the robot continues to move, for example because somebody pushes it, Stop
+        is due again, after longer and longer times.
         """
         if not self._error.outside:
             self._stood_s += seconds

@@ -34,8 +34,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of assuming that a frame gained bytes although a header follows at its usual length.
-Such a header shows that the frame has probably gained no bytes."""
+"""Extra cost of the assumption that a frame gained bytes, if a header follows at the frame's usual
+length. In this case, the frame has probably gained no bytes."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
@@ -45,14 +45,14 @@ BAD_TAIL: Final = 2.5
 """Extra cost of a run of unexplained bytes that follows a frame but does not begin with a header.
 Such a run is rare."""
 UNKNOWN_START: Final = 1.0
-"""Cost of assuming that the bytes begin within a frame, not at the beginning of one.
+"""Cost of the assumption that the bytes begin within a frame.
 
-After a silence, a complete frame is more likely.
+After a silence, the first bytes are more likely the beginning of a frame.
 """
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a run of unexplained bytes, in addition to ``BAD_RUN``.
 
-A run of 14 bytes costs more than any true IMU frame.
+An IMU frame has 14 bytes. As a run of unexplained bytes, they cost more than any true IMU frame.
 """
 BAD_HEADER: Final = 0.5
 """Cost of a header within unexplained bytes. Such a header may arise by chance, or from the values
@@ -96,14 +96,15 @@ LOOK_ALIKE: Final = 12.0
 Such a frame is probably misread: what looks like its header is a gyro value of -6 of another frame.
 """
 JUMP: Final = 2.5
-"""Cost of a counter that did not advance by one. It is the cost of the assumption that a frame
-before it was lost."""
+"""Cost of a frame whose counter did not advance by one. The decoder then assumes that a frame was
+lost before this one."""
 IMPOSSIBLE: Final = 2.0
 """Cost of a movement that a robot with this board cannot make."""
 OFF_BEAT: Final = 1.0
-"""Cost of an unexpected number of IMU frames before a delta, or of deltas before a pose.
+"""Cost of a delta after an unexpected number of IMU frames, or of a pose after an unexpected number
+of deltas.
 
-At 25 Hz, four IMU frames and five deltas are expected.
+At 25 Hz, four IMU frames before each delta and five deltas before each pose are expected.
 """
 
 CONTRADICTED: Final = 1.5

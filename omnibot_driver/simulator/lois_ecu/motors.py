@@ -105,8 +105,8 @@ class Encoder:
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._level_from = self._level_to = 0.0
-        """Two positions, in periods of the disc: the ends of the level that is now at the
-        sensor."""
+        """Positions of the two ends of the level that is now at the sensor, in periods of the disc.
+        """
         self._per_turn = steps / 2
         self._short = short
         # The distance between two marks has the position errors of both marks. So the error of each

@@ -168,8 +168,8 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
 
-        If ``post`` has already kept such a report, because no port waited for it, call ``then``
-        now.
+        ``post`` may have kept an earlier report of this kind that no port waited for. Then this
+        report is used, and ``then`` is called now.
         """
         motion = self.motions[kind]
         if motion.posts:

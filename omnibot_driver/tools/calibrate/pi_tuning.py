@@ -51,8 +51,8 @@ LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
 """Candidates for Td above 0, as fractions of the nominal control period.
 
-They are used if a phase margin is required. With Td = 0, an oscillation from one control period to
-the next would not decay.
+They are used only if a phase margin is required. Td must then be above 0: with Td = 0, an
+oscillation from one control period to the next would not decay.
 """
 
 
@@ -62,7 +62,8 @@ class Goals:
 
     ``overshoot``: largest overshoot, as a fraction of the speed.
 
-    ``band``: largest deviation from the final speed once a step has settled, as a fraction of it.
+    ``band``: largest deviation from the final speed after the step has settled, as a fraction of
+    the final speed.
 
     ``destination``: set-point, as a fraction of the speed at full duty.
 
@@ -157,8 +158,8 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
     """Predict a step from several starting positions of the wheel, and return its traits.
 
-    The result contains the largest overshoot and the longest settling time of all starting
-    positions, and the mean of their errors.
+    The result has the largest overshoot, the longest settling time and the mean of ``error_s`` over
+    all starting positions.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)

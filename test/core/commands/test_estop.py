@@ -21,10 +21,10 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The driver sends the e-stop at once, and then refuses commands.
+    """The e-stop is latched during a drive. The driver sends it at once, and the robot stops.
 
-    The e-stop is latched while the robot drives. The robot stops. While the e-stop is latched, the
-    driver sends only pairs of ES (the board's own emergency stop) and Stop.
+    While the e-stop is latched, the driver refuses commands. It sends only pairs of ES (the board's
+    own emergency stop) and Stop.
     """
     bench.drive(0.5)
     bench.run(0.1)
@@ -70,10 +70,10 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """An e-stop that is latched while the port is closed is sent right after the reconnect.
+    """An e-stop is latched while the port is closed. The answer says that the port is not open.
 
-    The answer to the e-stop says that the port is not open. After the reconnect, the emergency stop
-    frame follows directly after the opening bytes.
+    When the port opens again, the driver sends the emergency stop frame directly after the first
+    bytes: Stop and S (start).
     """
     bench.close()
     assert "port is not open" in estop(bench, True)
@@ -104,9 +104,9 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """If the board holds the e-stop after its release, one notice advises the user to call ~/reset.
+    """The e-stop is released, but the board itself still holds it, and ignores all commands.
 
-    This board ignores all commands until it is reset.
+    The board holds it until it is reset. One notice advises the user to call ~/reset.
     """
     bench = driving(estop_latches=True)
     estop(bench, True)

@@ -132,9 +132,9 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     The driver adds the rounding error of each angle to the next angle. Nevertheless, no angle in
     its lines exceeds 90°.
 
-    The limit of 90° also holds for damaged lines. From a line with a checksum, two characters are
-    lost whose loss the checksum does not detect. From a line without a checksum, one character is
-    lost.
+    The limit of 90° also holds for damaged lines. The test removes two characters from each line
+    with a checksum. It chooses them so that the checksum does not detect their loss. From each line
+    without a checksum, the test removes one character.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):
@@ -146,9 +146,10 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 
 
 def test_rounding_errors_near_90_degrees_are_not_lost() -> None:
-    """The wheel stays near 90°. The mean of the relayed angles is right, although none exceeds 90°.
+    """The wheel stays near 90°. No relayed angle exceeds 90°, but the mean of the angles is right.
 
-    An error that cannot be added to one angle is added to a later one.
+    If the rounding error of one angle cannot be added to the next angle, it is added to a later
+    one.
     """
     relay = AngleRelay()
     told = [float(relay.text(math.radians(89.7), sums=False)[4:]) for _ in range(200)]

@@ -356,9 +356,10 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The front board's clock is ahead by ``ahead_s``, in s. Then the boards exchange ports.
+    """The front board's clock is ahead of the drive board's clock by ``ahead_s``, in s.
 
-    The driver does not use the front board's clock for the stamps of the drive board.
+    The boards exchange ports. Nevertheless, the driver does not use the front board's clock for the
+    stamps of the drive board.
     """
     bench = Bench()
     bench.robot.front._restart(ahead_s)

@@ -163,9 +163,10 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """Each gap in the readings restarts a calibration, so its time limit passes.
+    """The readings have gaps, and each gap restarts the calibration. So it is not complete in time.
 
-    The calibration then fails. It leaves the bias as it was, and its message names the gaps.
+    At its time limit, the calibration fails. It leaves the bias as it was, and its message names
+    the gaps.
     """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)

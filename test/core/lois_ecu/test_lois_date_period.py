@@ -54,10 +54,10 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The driver confirms the board's settings without a change of the user's date period.
+    """The driver confirms the board's settings, and keeps the user's period of the date.
 
-    To confirm the settings, the driver requests one date. This request ends the periodic dates. So
-    the driver sets the period again afterwards.
+    To confirm the settings, the driver requests one date. The board then no longer sends the date
+    periodically. So the driver sets the period again afterwards.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

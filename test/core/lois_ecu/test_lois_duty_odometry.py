@@ -28,10 +28,11 @@ def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
-    """The robot drives forward by duty after the board's start. The odometry shows this drive.
+    """The robot drives forward by duty. The odometry is right, although no ticks are counted.
 
-    The public firmware counts no ticks in this drive, and its own odometry (0x20) does not change.
-    The driver does not conclude from this that the robot is at rest.
+    After the board's start, the public firmware counts no ticks in such a drive, and the board's
+    own odometry (0x20) does not change. The driver does not conclude from this that the robot is at
+    rest.
     """
     one = by_duty([(3.0, PUSH)], seed)
     assert one.way_m > 0.7

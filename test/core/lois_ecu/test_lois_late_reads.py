@@ -52,7 +52,7 @@ def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows()
 
 
 def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
-    """A read is 5 s late. Its reports are from the first second, because the buffer was full."""
+    """A read is 5 s late. Its reports are from the first second: then, the buffer was full."""
     late_reads = listening()
     found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
     assert found[:-1] == about(2.0, 2.2, 2.4, 2.6)
@@ -258,7 +258,8 @@ def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
 def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: float) -> None:
     """The robot is at rest. Its board restarts during a stall. The pose does not change.
 
-    The manual's board has a clock in ns, so only the arrival times show that it has restarted.
+    The manual's board has a clock in ns, which begins at zero every 4.3 s, not only after a
+    restart. So only the arrival times show that the board has restarted.
     """
     bench = Bench("documented")
     for _ in range(14):

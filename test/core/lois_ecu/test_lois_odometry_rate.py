@@ -37,7 +37,7 @@ def test_odometry_that_is_late_is_not_published_twice_at_once(
 
 @FIRMWARE
 def test_the_first_odometry_is_published_once(firmware: str) -> None:
-    """The first odometry is not published twice. The next one is published one period later."""
+    """The driver publishes the first odometry only once, and the next one a period later."""
     lois = LoisRobot(firmware)
     board, now, times = LoisEcuBoard(LoisEcuSettings()), 1000.0, []
     board.connect()

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Encoders with few and many ticks per turn: the limits of tick counts depend on the resolution.
+"""Tests of tick counts with encoders of few and of many ticks per turn.
 
-The checks of the counts accept each motion of a wheel, and still notice errors and restarts.
+The limits for the counts depend on this resolution. With each resolution, the driver accepts every
+motion of a wheel, and still notices errors and restarts.
 """
 
 import math

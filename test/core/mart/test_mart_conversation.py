@@ -95,8 +95,8 @@ def test_a_reply_answers_the_pending_request() -> None:
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
     """A late reply to an earlier request arrives while another request is pending.
 
-    The server never answers the pending request in this form. So the driver discards the late
-    reply.
+    The late reply has a form that the reply to the pending request never has. So the driver
+    discards it.
     """
     talk = conversation()
     talk.ask(word.request(), 1.0)
@@ -120,8 +120,8 @@ def test_no_late_ok_proves_the_imu() -> None:
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
     """RST IMU checks the IMU. A late ok to an earlier command could be taken for its reply.
 
-    So the driver waits before it sends RST IMU: any late ok then arrives before RST IMU can be
-    answered.
+    So the driver waits before it sends RST IMU. It waits so long that any late ok arrives earlier
+    than the reply to RST IMU can arrive.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -221,11 +221,11 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """The driver sends a start, then a stop, then a second stop.
+    """The driver sends a start, then a first stop, then a second stop.
 
-    The first stop may arrive before the start, so the reply to the first stop proves nothing. For
-    0.6 s after the first stop, any reply may be a copy of this worthless reply. Only a reply after
-    this time proves a stop.
+    The first stop may arrive before the start, so the reply to it proves nothing. A copy of this
+    reply may arrive until 0.6 s after the first stop. So only a reply after this time proves a
+    stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -296,8 +296,8 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
     """During a motion, a smaller encoder count arrives after a larger one.
 
-    The network has delayed or duplicated the smaller count. So the smaller count does not change
-    the pose.
+    The count never falls in such a motion, so the network has delayed or duplicated the smaller
+    count. It does not change the pose.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -323,10 +323,10 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """The first reply after the start of a forward drive (RM) still has the heading from before RM.
+    """The first heading after the start of a forward drive (RM) is the last heading before RM.
 
-    RM sets the server's heading to zero. So the server sent this reply before RM began, and the
-    odometry does not use its heading.
+    RM sets the server's heading to zero. So the server must have measured this heading before RM
+    began, and the odometry does not use it.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
@@ -351,5 +351,5 @@ def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
 
 
 def test_no_two_commands_have_the_same_text() -> None:
-    """Commands are compared by their texts, so each text belongs to one command only."""
+    """The driver compares commands by their texts. So no two commands have the same text."""
     assert len({word.text for word in words.WORDS}) == len(words.WORDS)

@@ -33,7 +33,7 @@ def texts(bench: MartBench, since: int = 0) -> list[str]:
 
 
 def once(chosen: Callable[[bytes], bool]) -> Callable[[bytes], bool]:
-    """Return a function that returns True once: for the first datagram with ``chosen`` true."""
+    """Return a function that is true only for the first datagram for which ``chosen`` is true."""
     seen: list[bytes] = []
 
     def first(data: bytes) -> bool:
@@ -148,9 +148,10 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """The robot drives to a goal, and all replies come 0.28 s late.
 
-    After each move, the driver sends a stop, because the network may have duplicated the request of
-    the move: the robot would then move a second time. Without a duplicate, the server has nothing
-    to stop, and answers the stop sooner. The driver then continues, and the robot reaches the goal.
+    The network may have duplicated the request of a move. The robot would then move a second time,
+    so the driver sends a stop after each move. A server without a duplicate has nothing to stop,
+    and answers sooner than a server that stops a duplicate. The driver then continues, and the
+    robot reaches the goal.
 
     ``copied``: whether the network duplicates the request. If so, the driver reports it, and adds
     the first run to the odometry.
@@ -174,11 +175,11 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """The late reply to a start arrives after a stop. It is not taken for the reply to the stop.
+    """A late reply to a start arrives after a stop. It is not taken for the reply to the stop.
 
-    This happens as follows. The driver mistakes a copy of the IMU check's ``ok`` for the reply to
-    the start of a backward drive. It sends a stop, which is lost. Then the true reply to the start
-    arrives.
+    The driver checks the IMU, and then starts a backward drive. It mistakes a copy of the check's
+    ``ok`` for the reply to the start. It then sends a stop, which is lost. After that, the true
+    reply to the start arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

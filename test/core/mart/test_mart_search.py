@@ -95,10 +95,11 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The test changes the modelled driver: it now sends SRM, a stop, directly after SL.
+    """The test changes the modelled driver, so that it sends SRM, a stop, directly after SL.
 
-    SRM can hang the server at that time. So the real driver first sends queries that show whether a
-    motion continues. The search finds that the changed driver hangs the server.
+    SRM can hang the server at that time. The real driver avoids this: before it sends SRM, it sends
+    queries that show whether a motion continues. The search finds that the changed driver hangs the
+    server.
     """
 
     def sweeps(world: World) -> model.Step:
@@ -146,9 +147,9 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    While the server's command port is silent, the server shows neither its motion nor the reason
-    for the silence. This function then replaces the values of both by fixed ones, and the value of
-    ``released`` too.
+    While the server's command port is silent, the server shows neither its motion nor why the port
+    is silent. The function then replaces the motion, the reason (``port``) and ``released`` by
+    fixed values.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
@@ -159,9 +160,11 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    All commands are compared, with two exceptions. A busy server executes only the commands on its
-    stop port (SL and SS), so for a busy server, only SL and SS are compared. After the stop port
-    has stopped a motion (``released``), ``L`` is not compared.
+    All commands are compared, with two exceptions:
+
+    - A busy server executes only the commands on its stop port (SL and SS). So for a busy server,
+      only SL and SS are compared.
+    - After the stop port has stopped a motion (``released``), ``L`` is not compared.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

@@ -116,11 +116,11 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """The board's switch is on position control. The driver stops the robot within 0.3 s and 5 cm.
+    """The board's switch is on position control, so the board takes a velocity for a goal.
 
-    The board takes a commanded velocity for a goal. The small numbers of a slow velocity mean a
-    goal near the board's origin. The robot is 3 m in front of this origin, so it drives backward
-    although forward is commanded.
+    The small numbers of a slow velocity mean a goal near the board's origin. The robot is 3 m in
+    front of this origin, so it drives backward although forward is commanded. The driver stops it
+    within 0.3 s and 5 cm.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m

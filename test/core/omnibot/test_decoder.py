@@ -116,10 +116,9 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """The decoder returns all frames of a shock, which continues after a delta and until a silence.
+    """A shock affects the IMU frame before a delta and the one after it. Then the line is silent.
 
-    The shock affects the IMU frames before and after the delta. The adapter delivers the last IMU
-    frame in two parts. Then the line is silent.
+    The adapter delivers the second IMU frame in two parts. The decoder returns all frames.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
@@ -159,11 +158,11 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """If pauses show the ticks, an IMU frame waits only in ticks in which a delta is due.
+    """The end of an IMU frame, FF FB or FF FC, could also be the header of the next frame.
 
-    The frame ends with FF FB or FF FC, which could also be the header of the next frame. The pauses
-    between the ticks (10 ms) tell the decoder in which ticks a delta is due. In all other ticks,
-    the decoder returns the IMU frame at once.
+    If a delta is due in this tick, the decoder waits for more bytes. In all other ticks, it returns
+    the IMU frame at once. The pauses between the ticks (10 ms) tell the decoder in which ticks a
+    delta is due.
     """
     made, waited = FrameDecoder(), []
     for tick in range(60):
@@ -185,10 +184,10 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """Decoding starts at any of the first 345 bytes. All frames but at most two are returned.
+    """Decoding starts within the first 345 bytes. All frames but at most two are returned.
 
-    To save time, the test does not begin at each byte in all cases. If the bytes come in ticks, it
-    begins at every 9th byte. If they come one by one, it begins at every 23rd byte.
+    If all bytes come at once, the test starts at each of these bytes. To save time, it starts only
+    at every 9th byte if the bytes come in ticks, and at every 23rd byte if they come one by one.
     """
     ticks = ticks_of(name)[:40]
     stream = b"".join(ticks)

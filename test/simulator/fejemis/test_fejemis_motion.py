@@ -36,7 +36,7 @@ def test_the_body_moves_by_the_equations_of_the_manual(
 ) -> None:
     """``rc`` commands the velocities v and w, but the body moves with ``speed`` and ``turn``.
 
-    These are calculated by hand from the manual's equations.
+    The manual's equations give ``speed`` and ``turn``. The values here were calculated by hand.
     """
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)

@@ -300,10 +300,10 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """Without the quirk ``crashes_on_missing_numbers``, such a command does not crash the server.
+    """The quirk ``crashes_on_missing_numbers`` is off. A command has too few numbers.
 
-    A command has too few numbers. The server replies that the command's format is wrong.
-    Afterwards, it still answers HELLO.
+    The server does not crash. It replies that the command's format is wrong, and it still answers
+    HELLO.
     """
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":

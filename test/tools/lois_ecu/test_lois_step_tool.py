@@ -77,9 +77,9 @@ def test_a_limit_that_reduces_the_full_duty_is_named(
 def test_values_that_an_ended_measurement_leaves_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The tool ends early. Its error names the parameters that had no value before.
+    """The tool ends early. It cannot restore the parameters that had no value before.
 
-    It cannot restore these parameters.
+    Its error names these parameters.
     """
 
     def fail(*_arguments: object) -> None:
