@@ -20,19 +20,19 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between two late messages of one series. If a series lasts 5 s
-(``HEALS_AFTER_S``), the sender's clock was probably set back."""
+"""Longest pause, in s, in a series of late messages. After a longer pause, a new series begins. If
+a series lasts ``HEALS_AFTER_S`` (s), the sender's clock was probably set back."""
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
 corrects a clock."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor for the misfit of a message that is too early for a sender (``_Sender.misfit_s``). With
-this factor, a message that is 1 s too early fits as badly as a message that is 10 s too late. A
-message is assigned to the sender that it fits best."""
+"""Factor for the misfit (``_Sender.misfit_s``) of a message that is too early for a sender. A
+message that is 1 s too early fits as badly as a message that is 10 s too late. A message is
+assigned to the sender that it fits best."""
 ALIKE_S: Final = 0.02
-"""Two senders fit a message equally well if their misfits (``_Sender.misfit_s``) differ by at most
-this time, in s. In this case, the message is assigned to the sender whose last message had the
-higher number."""
+"""Largest difference in s between the misfits (``_Sender.misfit_s``) of two senders that fit a
+message equally well. Of these two, the driver assumes the sender whose last message had the higher
+number."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender's clock is regarded as known. If there are
@@ -67,7 +67,8 @@ class Delay:
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
     * ``sent_ns``: time of sending by our clock. While the offset of the sender's clock is unknown,
-      these are two possible times. Otherwise it is one time.
+      there are two possible times: the estimated time, and the sender's own time. Later, there is
+      only the estimated time.
     """
 
     total_s: float
@@ -100,8 +101,10 @@ class Transit:
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
         """Return the delay of this message.
 
-        ``longest_s``: a message with a longer delay is late. The first message of a sender is
-        assumed to have no delay in transit.
+        The delay is estimated by a comparison with earlier messages of the sender. The sender's
+        first message is assumed to have no delay in transit.
+
+        ``longest_s``: a message with a longer delay is late.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -164,7 +167,7 @@ class _Sender:
         The misfit says how badly the time of the message fits this sender; 0 fits exactly. If the
         message is too late, the misfit is the time by which it is too late. If the message is too
         early, the misfit is ten times (``CLOCK_RETREATS``) the time by which it is too early. The
-        exact misfit is unknown, because the clocks drift.
+        clocks drift by an unknown amount, so only a smallest and a largest misfit are known.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
@@ -193,10 +196,10 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return how late a message is at least, in s: ``difference_s`` minus offset and drift.
+        """Return the least time in s by which a message may be late; it may be negative.
 
-        The drift is the largest possible one, so the result may be negative. ``difference_s``:
-        arrival by our clock minus sending by the sender's clock.
+        The result is ``difference_s``, minus the offset, minus the largest possible drift.
+        ``difference_s``: arrival by our clock minus sending by the sender's clock.
         """
         return difference_s - self._least_s - self._drift_s(at_s)
 

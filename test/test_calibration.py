@@ -29,7 +29,7 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
 def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
     """A missing file or an empty file contains no calibration.
 
-    A save also makes the folder of the file.
+    If the folder of the file is missing, a save makes the folder.
     """
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}

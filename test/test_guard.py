@@ -82,11 +82,10 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """New stop bytes are valid at once, for the present guard process and for its successor.
+    """The driver changes the stop bytes when the state of the board changes.
 
-    The driver changes the stop bytes when the state of the board changes. The present guard process
-    then writes the new bytes. If another guard process replaces it, that process writes the new
-    bytes, too.
+    From then on, the guard process writes the new bytes. If another guard process replaces it, the
+    other process writes the new bytes, too.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -109,10 +108,10 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 def test_the_last_packets_of_an_orderly_end_are_not_discarded(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When the driver ends without a proof of a stop, the guard does not discard its last packets.
+    """If the driver ends without a proof of a stop, its last packets are not discarded.
 
-    These packets, such as a pause, may still wait in the kernel. So the guard repeats Stop without
-    discarding them.
+    These packets, such as a pause, may still wait in the kernel. So the guard process repeats Stop
+    without discarding them.
     """
     reading, writing = os.pipe()
     process = SimpleNamespace(stdin=os.fdopen(writing, "wb", 0), wait=lambda _within_s: 0)
@@ -255,9 +254,9 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """The guard writes the newest stop bytes.
+    """The driver replaces the stop bytes several times, and then ends.
 
-    The driver replaces the stop bytes several times, and then ends.
+    The guard process writes only the newest stop bytes.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())

@@ -230,7 +230,7 @@ def test_late_commands_of_two_senders_are_refused_after_one_of_them_was_silent(
 ) -> None:
     """Late commands of two senders on one host are refused, although one sender was silent before.
 
-    The host's clock drifts during this silence. A late command of each sender comes after it.
+    During this silence, the host's clock drifts. After it, each sender sends a late command.
     """
     receiver, silent, busy = Receiver(), Sender(), Sender(sent=1000)
     receiver.hear(busy, 99.0, 0.01)
@@ -277,10 +277,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """After a sender's late first message, the driver finds two possible times for the next one.
+    """A sender's first message is late by 0.5 s. The second has two possible times of sending.
 
-    The first is the time by the sender's clock plus 0.5 s, the delay of the first message. The
-    second is the time by the sender's clock. Here, this clock is right.
+    One time is that of the sender's clock, which is right here. The other time is 0.5 s later,
+    because the driver assumes that the first message was in time.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -290,9 +290,9 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the driver finds only one possible time of sending.
+    """The sender's clock is an hour behind. After ten messages, the driver knows this difference.
 
-    The time is right although the sender's clock is an hour behind. The driver knows this by then.
+    So the driver finds only one possible time of sending, which is right.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

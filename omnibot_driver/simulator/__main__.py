@@ -132,9 +132,8 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 def _signals_as_readable() -> Iterator[int]:
     """Yield a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives.
 
-    These signals have no other effect. There is one exception: under nohup, for example, the
-    process ignores SIGHUP from the start. Then SIGHUP remains ignored, and the descriptor does not
-    show it.
+    These signals have no other effect. If the process ignores SIGHUP from the start, for example
+    under nohup, it continues to ignore it: SIGHUP then has no effect on the descriptor either.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)

@@ -41,10 +41,9 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """A silence that begins after a reading is a new silence, and is reported.
+    """The board falls silent, which is reported. Then a reading arrives.
 
-    A first silence was reported before this reading. The new silence is reported after 2 s without
-    data.
+    The next silence is a new one. It is reported too, after 2 s without data.
     """
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0

@@ -67,8 +67,8 @@ def row(
 ) -> None:
     """Print a row of the table: the shortest and the longest reaction time.
 
-    The motion may begin at any tick between two displacements. For each of these ticks, the
-    function measures one reaction time.
+    The reaction time depends on the tick, between two displacements, at which the motion begins. So
+    the function measures one reaction time for each of these ticks.
     """
     shown = []
     for period_s in PERIODS_S:

@@ -15,17 +15,15 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-For each decoded frame, the judge searches forward for an equal true frame. It skips the true frames
-before that one. If it skips more than ``MOST_DROPPED`` intact frames, it also searches for the next
-decoded frame of the same read. If it skips more than ``MOST_DROPPED`` intact frames for this frame
-too, the first decoded frame is wrong: by chance, it equals a true frame that was sent much later.
-If the read has no next decoded frame, the judge accepts the first one.
+For each decoded frame, the judge searches forward for an equal true frame, and skips the true
+frames before it. If it skips more than ``MOST_DROPPED`` intact frames, the two frames may be equal
+by chance. So the judge also searches for the next decoded frame of the same read, after the found
+frame. If this search skips more than ``MOST_DROPPED`` intact frames too, the first decoded frame is
+wrong. If the read has no next decoded frame, the judge accepts the first one.
 """
 REACH_BYTES = 600
-"""The search for the true frames of a read begins this number of received bytes before it.
-
-In the true stream, it begins another 300 bytes earlier.
-"""
+"""Start of the search for the true frames that match a read. The search begins this number of
+received bytes before the read, and then another 300 bytes earlier in the true stream."""
 
 
 @dataclass(slots=True)

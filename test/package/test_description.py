@@ -71,9 +71,9 @@ def test_the_joints_are_those_of_joint_states() -> None:
 
 
 def test_the_frames_are_those_of_the_driver() -> None:
-    """The root of the description is base_link.
+    """In the description, base_link has no parent: it is the root.
 
-    The driver publishes odom as the parent of base_link, and a frame can have only one parent.
+    A frame can have only one parent, and the driver publishes odom as the parent of base_link.
     """
     assert ROBOT.get_root() == PARAMETERS.by_name["base_frame"].default
     assert {PARAMETERS.by_name["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
@@ -94,9 +94,9 @@ def test_the_default_geometry_is_the_drivers() -> None:
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
     """The driver's kinematics convert a motion of the body to wheel rates.
 
-    The wheels of the description turn at these rates, and each wheel rolls over the ground. The
-    speed of rolling equals the speed of the body at the place of this wheel, in the rolling
-    direction. Motion across the rolling direction is not compared, because the rollers allow it.
+    The wheels of the description turn at these rates, and each wheel rolls over the ground. In the
+    rolling direction, its speed equals that of the body at the place of the wheel. Motion across
+    the rolling direction is not compared, because the rollers allow it.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -43,7 +43,10 @@ def run(command: Sequence[str | Path], cwd: Path) -> str:
 
 @contextmanager
 def running(command: Sequence[str | Path], cwd: Path) -> Iterator[subprocess.Popen[str]]:
-    """Run the command while the context lasts; kill it at the end, or after 60 s at the latest."""
+    """Run the command during the ``with`` block, and yield its process.
+
+    The process is killed at the end of the block, and after 60 s at the latest.
+    """
     process = subprocess.Popen(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )

@@ -28,10 +28,10 @@ SIDEWAYS = 50
 The search begins at the delta that fits the message's timestamp.
 """
 LONGEST_STALL = 1000
-"""How far to search for the IMU frame that matches a message, as a number of frames.
+"""Reach of the search for the IMU frame that matches a message, as a number of frames.
 
-The search begins at the frame that fits the message's timestamp. After a stall of the computer, the
-matching frame may be far from it.
+The search begins at the frame that fits the message's timestamp, and goes in both directions. After
+a stall of the computer, the matching frame may be far from this first frame.
 """
 
 Triple = tuple[float, float, float]

@@ -133,7 +133,8 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 
     A note says that these signs describe a mirror image of the robot.
 
-    The answer "r" repeats the motion. After an invalid answer, the tool asks again.
+    Before the other answers, the user answers "r", and the tool repeats the motion. The next answer
+    is invalid, and the tool asks again.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

@@ -206,7 +206,8 @@ def _encode_record(record: Record) -> bytes:
 def single_report(line: Line) -> Report | None:
     """Return the report that ``line`` contains.
 
-    None if ``line`` is not a report with only one line, or if a value is impossible.
+    Return None if the report has more than one line, if ``line`` is not a report, or if a value is
+    impossible.
     """
     payload = line.payload
     low = payload & 0xFFFF

@@ -18,14 +18,15 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Limit in s for the time without reports. If no report arrived for longer than this, and then
-several tick reports arrive together, their times are corrected. ``BoardTime`` handles shorter
-delays."""
+"""Longest usual time in s without a report. If no report arrives for longer, and then several tick
+reports arrive together, they were read late, and their times are corrected. ``BoardTime`` handles
+shorter delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor by which the computed time between two reports is increased. The rate of the board's
-clock is not known exactly. So if every read is late, computed times without this factor could
-differ from the arrival times more and more. With the factor, the difference becomes smaller."""
+"""Factor, a little above 1, for the computed time between two reports. If every read is late, all
+times are computed from the board's clock. The rate of this clock is not known exactly, so the
+computed times could fall behind the arrival times more and more. The factor reduces this difference
+again."""
 
 
 @value(frozen=True, slots=True)
@@ -93,8 +94,9 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether this report was read late. A report was read late if no report arrived
-          for more than ``LATE_S`` before it, and if later tick reports arrived together with it.
+        * ``late``: whether this report was read late. Two signs together show this: no report
+          arrived for more than ``LATE_S`` before it, and later tick reports arrived together with
+          it.
         * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s
@@ -117,8 +119,8 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        After a restart, the clock and the counts begin at zero. The clock alone proves nothing: a
-        clock in ns begins at zero every 4.3 s even without a restart.
+        After a restart, both the clock and the tick counts begin at zero. The clock alone proves
+        nothing: a clock in ns wraps to zero every 4.3 s even without a restart.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

@@ -21,9 +21,9 @@ ODOMETRY_AGE_S: Final = 0.0135
 """Age in s that the driver assumes for the values in an odometry report when the report's last line
 arrives. The values are that old because the board takes them before it sends the first line."""
 DOUBT: Final = 3.0
-"""Limit for the difference between a value that the board reports and the value that the filter
-expects, in standard deviations. Above this limit, the filter increases the variance of its
-estimate."""
+"""Limit for the difference between a reported value and the value that the filter expects, in
+standard deviations. If the difference is larger, the filter's estimate is probably wrong, so the
+filter increases the variance of this estimate."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used. A slower wheel may have rested between its last two
 ticks."""
@@ -48,9 +48,9 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest value that the driver assumes for the integral of a wheel's speed controller while the
-wheel does not tick. The unit is ``WINDUP_M``. While a wheel is at rest, its controller integrates
-the speed error. When the integral reaches ``WINDUP_M``, the controller starts the wheel."""
+"""Largest assumed value of a speed controller's integral while its wheel does not tick, as a
+fraction of ``WINDUP_M``. The controller integrates the speed error of a wheel at rest. When the
+integral reaches ``WINDUP_M``, the controller starts the wheel."""
 
 
 class ReportedSpeed:
@@ -66,9 +66,8 @@ class ReportedSpeed:
         self._repeats = 0
         self._jumped = False
         self._doubted_m = 0.0
-        """Standard deviation in m that the driver has added to the wheel's distance since the
-        wheel's reported speed last changed. The driver adds it because the wheel may have been at
-        rest since that change."""
+        """Standard deviation in m that the driver has added to the wheel's distance, because the
+        wheel may be at rest. It is 0 again after each change of the wheel's reported speed."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
@@ -81,12 +80,11 @@ class ReportedSpeed:
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Record that the wheel is at rest, and subtract the distance added since it stopped.
+        """Record that the wheel is at rest, and subtract the distance that was added wrongly.
 
-        Usually, the driver assumes that the wheel stopped when its reported speed last changed.
-        There is one exception: after this change, the driver may have sent a command to start,
-        which the wheel did not obey. In this case, the driver assumes that the wheel stopped at the
-        time of the command.
+        Usually, this is the distance since the wheel's reported speed last changed. There is one
+        exception: after this change, the driver may have sent a command to start, which the wheel
+        did not obey. Then it is the distance since that command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -181,9 +179,10 @@ class ReportedSpeed:
         """Add an error to the distance of a wheel that is estimated as rolling, but may be at rest.
 
         If the wheel is at rest, the whole distance that was added since its reported speed last
-        changed is wrong. This wrong distance grows from report to report, so the errors of
-        successive reports are not independent. The board's odometry (0x20) does not show the error,
-        because the board also computes with the old speed.
+        changed is wrong. This distance grows with each report. So the errors of successive reports
+        are not independent: together, their standard deviation is ``chance`` times this distance.
+        The board's odometry (0x20) does not show the error, because the board also computes with
+        the old speed.
 
         ``chance``: probability that the wheel is at rest.
         """

@@ -22,8 +22,8 @@ STALLED_S: Final = 2.0
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 LEAST_TICKS: Final = 2
-"""Smallest number of ticks that a wheel must make in ``STALLED_S``, by its set-point, to be
-watched. A slower wheel is not watched, because it may show no motion although it rolls."""
+"""Least number of ticks in ``STALLED_S`` that a wheel must make by its set-point. A wheel with a
+lower set-point is never regarded as stalled, because it may show no motion although it rolls."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
@@ -31,9 +31,9 @@ TOO_FAST_RPM: Final = 3
 limit is ``TOO_FAST_RPM`` RPM above the set-point. If the board repeats a speed that is above both
 limits, this speed is outdated, and the wheel is at rest."""
 UNLIKE: Final = 1.15
-"""Largest assumed ratio between the factors of the two wheels. The factor of a wheel is its speed
-divided by its set-point. If both wheels roll backward, both may be too fast, but their factors are
-similar."""
+"""Two wheels that roll backward may both be faster than their set-points, but by similar factors.
+The factor of a wheel is its speed divided by its set-point. ``UNLIKE`` is the largest assumed ratio
+between the factors of the two wheels."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
@@ -49,9 +49,8 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. This is so
-    if the board repeats an unusually high speed: higher than the speeds that it usually repeats for
-    a wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. It may
+    roll if the speed that the board repeats is higher than usual for a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -60,15 +59,15 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.may_roll = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of reports without motion. Counting begins at zero when the wheel
-        turns, when it is commanded to turn, and when a wheel is returned as stalled. A report is
-        counted only if it could have shown a motion of the wheel."""
+        """For each wheel: number of reports without motion. It is set to zero when the wheel turns,
+        when a command starts the wheel, and when ``stalled`` returns the wheel as stalled. A report
+        is counted only if it could have shown a motion of the wheel."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record a set-point. While a duty is commanded, no wheel is regarded as stalled."""
+        """Record a set-point. A wheel that is driven by duty is never regarded as stalled."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
@@ -134,7 +133,7 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        Only an unchanged speed can be old. It is old in two cases: the speed of the other wheel has
+        An unchanged speed is regarded as old in two cases: the speed of the other wheel has
         changed, or the speed of ``wheel`` is far above its set-point.
         """
         if told is None or self._told is None:

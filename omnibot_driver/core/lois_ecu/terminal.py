@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes of the terminal mode. Before a change of any mode, the robot must stand still.
+"""Changes of the terminal mode, and the stop of the robot before this and other changes.
 
 In a terminal mode, the board passes on the lines of a sensor. It then reports neither motion nor
 its e-stop button.
@@ -25,8 +25,9 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    It stops the robot before a sensor's mode begins. It also stops the robot before each change
-    that was passed to ``stop_first``. ``want`` and ``stop_first`` may be called at any time.
+    It stops the robot before a sensor's mode begins. Some parameters also change only at rest:
+    ``stop_first`` makes it stop the robot before such a change. ``want`` and ``stop_first`` may be
+    called at any time.
     """
 
     def __init__(self) -> None:
@@ -39,8 +40,7 @@ class ModeChange:
         """
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping: dict[str, str] = {}
-        """Changes that wait for the stop of the robot. They are new values of parameters, by
-        name."""
+        """The changes that wait until the robot has stopped: new values of parameters, by name."""
         self._stopping_since_s: float | None = None
         self.left = False
         """Whether the board has left a terminal mode. The code that reads this value then sets it
@@ -65,7 +65,8 @@ class ModeChange:
     def stop_first(self, parameter: str, value: str) -> None:
         """Stop the robot, because ``parameter`` gets a new ``value``.
 
-        Motion is refused until the robot is seen at rest, but for about ``UNPROVED_S`` at most.
+        Motion is refused until the robot is seen at rest. If it is not seen at rest, motion is
+        refused for about ``UNPROVED_S``.
         """
         self._stopping[parameter], self._stopping_since_s = value, None
 
@@ -113,9 +114,10 @@ class ModeChange:
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
         """Return the command to send now, or None. A mode is changed only after a standstill.
 
-        First, the driver sends Stop until it sees the robot at rest, but for at most
-        ``UNPROVED_S``. Then it sends RPM 0/0, which clears the board's RPM target. While this
-        target is positive, the public firmware counts backward motion by duty as forward motion.
+        First, the driver sends Stop. When it sees the robot at rest, or after ``UNPROVED_S``, it
+        sends RPM 0/0 instead, which clears the board's RPM target. This is necessary because of the
+        public firmware: while the RPM target is positive, the firmware counts backward motion by
+        duty as forward motion.
 
         ``stands``: whether the robot is seen at rest.
 

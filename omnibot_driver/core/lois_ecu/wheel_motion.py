@@ -60,9 +60,10 @@ ROLLED_OUT_S: Final = 1.0
 UNSETTLED_S: Final = (0.27, 0.06)
 """Time in s from which the error of a wheel's distance is computed after an early halt.
 
-An early halt is a halt soon after a new set-point, before the wheel has reached the speed that the
-filter assumed. The standard deviation of the distance is this time, multiplied by
-``unsettled_mps``. The first value is for the board's own gains, the second for the user's.
+A halt is early if it comes soon after a new set-point, when the wheel has not yet reached the speed
+that the filter assumed. The standard deviation of the distance is this time, multiplied by
+``unsettled_mps``. The first number is for the board's own gains, the second for gains that the user
+has set.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -110,9 +111,9 @@ class Wheel:
         """Distance in m that the wheel had rolled when its motion was last certain.
 
         The value is set when a new measured speed arrives, when the board restarts, and when the
-        controller is reset. It is also set when a command starts a wheel whose target was zero. The
-        driver may find out later that the wheel has been at rest since that time. It then subtracts
-        the distance that it has added since that time.
+        controller is reset. It is also set when a command starts a wheel whose target was zero. If
+        the driver finds out later that the wheel has been at rest since then, it subtracts the
+        distance that it has added since then.
         """
         self.begin_again()
 

@@ -16,9 +16,9 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""Number of starts in a row that do not turn the right wheel, after which the driver gives up. Only
-starts of a backward drive (B) or a turn (R, L) are counted. Each of these starts may have moved the
-robot, because the left wheel may have turned."""
+"""After this number of starts in a row that do not turn the right wheel, the driver gives up. Only
+starts of a backward drive (B) or a turn (R, L) are counted. The number is small, because each of
+these starts may turn the left wheel, and so move the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
@@ -32,8 +32,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: True if two conditions hold. The reply certainly answers the start command that
-        failed. The network is so good that it hardly delivers a late copy of this command.
+        ``arrived``: whether two points are certain: the reply answers this start command, and the
+        network is so good that no late copy of the command will arrive.
         """
         word = self._start
         assert word is not None
@@ -84,10 +84,10 @@ class FailedStarts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        This is assumed for each failure that is not an obstacle. An obstacle may be in front of the
-        robot, or it may have ended an earlier backward drive. The driver assumes that it is in
-        front in two cases: the front sonar detects an obstacle too, or RM reports an obstacle
-        again.
+        If the reported reason is not an obstacle, the result is True. If it is an obstacle, the
+        obstacle may have ended an earlier backward drive, or it may be in front of the robot. The
+        driver assumes that it is in front, and returns False, in two cases: the front sonar detects
+        an obstacle too, or RM reports an obstacle again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

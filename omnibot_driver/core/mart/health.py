@@ -64,8 +64,8 @@ class Health:
 
     ``reference_fails``: number of starts of RM in a row that have failed.
 
-    ``outlived``: whether the server answered a stop late, after the driver had used the stop port.
-    If this has happened, the stop of the next motion can fail.
+    ``outlived``: whether the server answered a stop only after the driver had used the stop port.
+    If so, the stop of the next motion can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -160,11 +160,7 @@ class Health:
         self.outlived = self._may_be_restarted = False
 
     def was_silent(self) -> None:
-        """Record that the server may have been restarted.
-
-        When the robot is next at rest, its heading shows whether the server was restarted
-        (``rests``).
-        """
+        """Record that the server may have been restarted. ``rests`` finds out whether it was."""
         self._may_be_restarted = True
 
     def rests(self, heading_rad: float) -> None:
@@ -212,8 +208,8 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If the server reported a failure of RM (forward drive) shortly before, it has nevertheless
-        started the motors. Such a server is defective.
+        The server may have reported shortly before that RM (forward drive) failed. Then RM has
+        started the motors in spite of this report, and the server is regarded as defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

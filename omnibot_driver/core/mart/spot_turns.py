@@ -33,7 +33,8 @@ HELD, LEAST_LESSON = 0.6, 0.6
 
 Both limits are fractions of the commanded rate.
 
-``HELD``: lowest measured rate from which the driver learns, if it has learned from an earlier turn.
+``HELD``: after the driver has learned from a turn, it learns only from turns with at least this
+measured rate.
 
 ``LEAST_LESSON``: lowest rate that the driver learns. If the measured rate is lower, the driver
 learns this lowest rate instead.
@@ -41,10 +42,10 @@ learns this lowest rate instead.
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Limits by which the driver finds that something held the robot in a turn.
+"""Limits that show that something held the robot in a turn.
 
-The driver assumes this if the turn was slower than HINDERED, and the next turn is faster than
-TOO_FAST. Both limits are fractions of the commanded rates.
+If a turn is slower than HINDERED, and the next turn is faster than TOO_FAST, something held the
+robot in the slow turn. Both limits are fractions of the commanded rates.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
@@ -63,16 +64,15 @@ rate.
 
 ``SEEN_RAD``: least angle of the turn, in rad.
 
-``TOLD_RAD``: angle of the turn in rad, above which the angle from the server is used. Below it, the
-angle that the wheel measured is used.
+``TOLD_RAD``: for turns by more than this angle, in rad, the angle from the server is used. For
+smaller turns, the angle that the wheel measured is used.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Terms of a limit. The limit applies to the difference between the angle in a reply to a stop
-command and the expected turn.
+"""Terms of the limit above which a number in a reply may be an encoder count instead of an angle.
 
-The limit is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the angle by which the
-robot turns during two queries. If the difference is larger, the number in the reply may be an
-encoder count instead of an angle.
+The reply answers a stop command, and should contain the angle of the turn. The driver compares the
+number with the expected turn. The limit for their difference is UNSURE_RAD (rad), plus UNSURE_PART
+times the expected turn, plus the angle by which the robot turns during two queries.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
@@ -126,11 +126,11 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The driver checks the IMU before each turn. The caller must send the request before this
-        check.
+        The driver checks the IMU before each turn. The caller must send SSP before this check of
+        the IMU.
 
-        ``delay_s``: shortest time in s between two SSP requests. When it has passed, no copy of the
-        earlier request can arrive any more.
+        ``delay_s``: shortest time in s between two SSP requests. After this time, no copy of the
+        first of the two requests can arrive any more.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -276,10 +276,11 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Forget what was learned from the previous turn, if it was slow and this turn is fast.
 
-        The two turns show that something held the robot in the previous turn.
+        A slow turn before a fast one shows that something held the robot in the slow turn.
 
         If this turn is slow, something may hold the robot now. So store what the driver knows
-        before it learns from this turn. The next call can then restore this knowledge.
+        before it learns from this turn. If the next turn is fast, the next call restores this
+        knowledge.
 
         ``part``: this turn's measured rate divided by its commanded rate.
         """

@@ -16,8 +16,8 @@ SPREAD_S: Final = 0.2
 class CorrectionSmoother:
     """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
-    In each step, the robot can move only by a certain distance and angle. The robot's own motion
-    uses up a part of them. The correction of ``pose`` uses at most the rest.
+    In each step, ``pose`` moves and turns at most as far as the robot could. It first follows the
+    robot's own motion. Then it is corrected, by at most the remaining distance and angle.
     """
 
     def __init__(self) -> None:
@@ -42,8 +42,8 @@ class CorrectionSmoother:
     def move(self, chord: Pose, room_m: float, room_rad: float) -> None:
         """Move ``pose`` and ``target`` by a displacement in the robot's own axes.
 
-        ``room_m``, ``room_rad``: largest distance and angle by which the robot can have moved in
-        this step.
+        ``room_m``, ``room_rad``: largest distance and angle that are possible for the robot in this
+        step.
         """
         pose, target = self.pose, self.target
         self.target = target.moved(chord)
@@ -52,9 +52,9 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` by the part of it that is allowed.
+        """Move ``target`` by a displacement, and ``pose`` as far as the limits for it allow.
 
-        ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
+        ``room_m``, ``room_rad``: these limits, which are a distance and an angle.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
@@ -66,8 +66,8 @@ class CorrectionSmoother:
 
         ``seconds``: duration of this step. The longer the step, the larger this part.
 
-        The robot can move only by a certain distance and angle in this step. ``move`` has used up a
-        part of them, so the correction uses at most the rest.
+        In each step, ``pose`` moves and turns at most as far as the robot could. ``move`` has
+        already used up a part of this distance and angle. The correction uses at most the rest.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

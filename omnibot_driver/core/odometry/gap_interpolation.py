@@ -13,8 +13,9 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated. The robot is
-unlikely to move longer in a gap: if the board sends no data, the driver stops the robot earlier."""
+"""Longest time, in s of the board's clock, over which motion is interpolated. If the board sends no
+data, the driver stops the robot before this time has passed. So the robot is unlikely to move for
+longer in a gap."""
 NO_WAY: Final = Pose()
 
 
@@ -33,9 +34,8 @@ class GapInterpolation:
         """Return two tangents (twist x time) in body axes.
 
         The first tangent is the motion of all lost displacements together. The second is the motion
-        of the displacement ``reading``.
-        ``heading_rad``: heading before the losses; None if no pose has arrived. If it is None,
-        ``reading`` is assumed to be in body axes.
+        that ``reading`` reports. ``heading_rad``: heading before the losses; None if no pose has
+        arrived. If it is None, ``reading`` is assumed to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

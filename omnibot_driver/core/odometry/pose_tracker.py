@@ -62,11 +62,11 @@ class PoseTracker:
         return _times(tangent, self._signed_size).over(seconds), rolling
 
     def way_to(self, place: Pose) -> Pose:
-        """Return the tangent from the robot's pose to ``place``.
+        """Return the tangent (twist x time) from the robot's best pose to ``place``.
 
-        A tangent is twist x time. The robot would turn in the direction with the smaller angle. The
-        result can be compared with the tangents that the board reports: it is in the board's body
-        axes and not corrected by ``scale``.
+        Its turn is in the direction with the smaller angle. The tangent is in the board's body
+        axes, and not corrected by ``scale``. So it can be compared with the tangents that the board
+        reports.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)

@@ -23,10 +23,9 @@ The longest frame has 15 bytes, and damage on the line can add 2.
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the rest of a run of unexplained bytes (a bad run), from long to short.
+"""Costs of the last 15, 14, ... 1 bytes of a run of unexplained bytes (a bad run).
 
-The first value is for a rest of 15 bytes, the last for one byte. The first value is a little below
-``DAMAGE``, the cost of a damaged frame.
+The cost of 15 bytes is a little below ``DAMAGE``, the cost of a damaged frame.
 """
 
 

@@ -16,10 +16,10 @@ SMALLEST_STEP_S: Final = 1e-6
 
 
 class ArrivalClock:
-    """Stamps readings with their arrival time, in increasing order.
+    """Stamps readings with their arrival time. Each stamp is later than the stamp before it.
 
-    A stamp can be later than the arrival time, but only if the previous read came at almost the
-    same time.
+    If two reads come at almost the same time, their stamps could be equal. So the stamps of the
+    second read can be a little later than its arrival time.
     """
 
     skew_ppm = 0.0

@@ -20,33 +20,32 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-This is long enough to contain the smallest delay of an adapter: if the period of the adapter's
-timer is wrong by 100 ppm, its delays repeat every 20 s.
+An adapter with a timer delays reads by different times, and the delays repeat: every 20 s, if the
+timer's period is wrong by 100 ppm. So 75 s always contain the adapter's smallest delay.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Fraction of a time span that decides which edge of the lower convex hull is the fitted clock.
+"""Position in a time span, from 0 (start) to 1 (end), that selects the fitted clock.
 
-The hull is that of the latest points. The fitted clock is the edge at this fraction of the hull's
-time span. With a larger fraction, the clock follows recent points more closely, but jitter affects
-it more.
+If no lower bounds are used, the fitted clock is an edge of the lower convex hull of the latest
+points: the edge at this position in the hull's time span. With a larger value, the clock follows
+recent points more closely, but jitter affects it more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
 late ones cannot be recognized."""
 LATE_PART: Final = 0.1
-"""The fit assumes that at most this fraction of the reads is late.
-
-A read is late if its delay exceeds ``LATE_S``, in s.
-"""
+"""Largest assumed fraction of reads that are late. A read is late if it is delayed by more than
+``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest difference between the upper and the lower bound of a block, as a fraction of a period.
 If they differ more, the lower bound is not used.
 
-With an adapter with a 16 ms timer, they differ by 2 ms, which is a fifth of a 10 ms tick.
+The limit is wide enough for an adapter with a 16 ms timer: its bounds differ by less than 2 ms,
+which is a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]
@@ -152,7 +151,7 @@ class ClockFit:
     def _lay_under(self) -> None:
         """Place the fitted clock under the latest points, along an edge of their lower convex hull.
 
-        This edge is at three quarters of the hull's time span (``SUPPORT``).
+        ``SUPPORT`` selects the edge.
         """
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])

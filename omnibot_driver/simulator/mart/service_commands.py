@@ -32,9 +32,9 @@ Handler = Callable[["MartServer", str], str | None]
 def missing(server: "MartServer", what: str) -> str | None:
     """Refuse a command that has too few numbers.
 
-    If the server has the quirk ``crashes_on_missing_numbers``, it ends instead.
+    A server with the quirk ``crashes_on_missing_numbers`` does not refuse the command, but ends.
 
-    ``what``: the reason that is recorded if the server ends.
+    ``what``: the reason to record if the server ends.
     """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"

@@ -54,7 +54,8 @@ class Step:
 
     ``rate_radps``: mean rate in each odometry delta, which lasts four ticks.
 
-    ``last_radps``: commanded rate before ``before_radps``. Its effect may still continue.
+    ``last_radps``: commanded rate before the previous step. The effect of that step may still
+    continue.
 
     ``last_ticks``: time from the onset of the previous step to this onset.
     """
@@ -73,8 +74,9 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: function for the model's response to a unit step. Its argument is the end of each
-        delta, in ticks after the unit step. It returns the mean rate in each delta.
+        ``mean``: function for the model's response to a unit step. Its argument contains one time
+        for each delta: from the unit step to the end of the delta, in ticks. It returns the mean
+        rate in each delta.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -247,10 +249,10 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps with corrected onsets. The corrected steps fit the model best.
+    """Return the steps with their onsets shifted so that the steps fit the model best.
 
-    An onset is computed from the time of a command. If a busy computer delayed the command, the
-    true onset is later.
+    The tool computes an onset from the time of a command. If a busy computer delays the command,
+    the true onset is later.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

@@ -20,8 +20,8 @@ The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 MANY: Final = 1.5
 """Limit for the ratio of the residuals to the quantisation error. Above it, the tool warns.
 
-Large residuals may mean that commands were delayed. Delayed commands have two effects: the
-residuals are twice as large, and the delay that the tool finds for the wheel is 4 ms too long.
+Large residuals may mean that the computer delayed commands. With delayed commands, the residuals
+are twice as large as without. The delay that the tool finds for the wheel is then 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of two residuals: the motor model's, divided by the second-order model's.
@@ -31,9 +31,10 @@ Above this ratio, the tool regards the motor model as wrong.
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Find better gains, and return the result. The gains are the same for all wheels.
+    """Find better gains, and return the result.
 
-    ``now``: the gains in the firmware, which also has one set of gains for all wheels.
+    ``now``: the gains in the firmware. The firmware has one set of gains for all wheels, so the
+    better gains are also the same for all wheels.
     """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)

@@ -168,9 +168,9 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the index at which its range ends.
 
-    The range of a long step is the range in which short steps can compensate it. It begins at the
-    long step, and has ``most`` steps. If another long step comes earlier, the range ends there. The
-    returned index is that of the first step after the range.
+    Short steps can compensate a long step only within its range. The range begins at the long step,
+    and has ``most`` steps. If another long step comes earlier, the range ends there. The returned
+    index is that of the first step after the range.
 
     ``wide``: indices of the long steps.
     """

@@ -36,10 +36,9 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """If a pause is under way at shutdown, the driver sends no second P.
+    """At shutdown, a pause is under way: P was sent, but the board has not confirmed it yet.
 
-    It has sent the first P, but the board has not confirmed the pause yet. A second P would resume
-    the board.
+    The driver sends no second P, because a second P would resume the board.
     """
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
@@ -55,9 +54,9 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """A shutdown pauses the board although a start was requested directly before.
+    """A paused board receives S (start). Directly after that, the driver shuts down.
 
-    The board is paused, and receives S (start). Then the driver shuts down with ``on_exit`` pause.
+    The setting ``on_exit`` is pause. The shutdown pauses the board again.
     """
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)

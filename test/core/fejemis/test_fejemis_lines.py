@@ -179,9 +179,9 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line with a wrong checksum is counted, and costs no later line.
+    """A line has lost its end, so it is joined to the next line. Both are discarded, as one fault.
 
-    A line has lost its end, so the next line is joined to it. Both are discarded.
+    The line after these two is decoded. A line with a wrong checksum is counted as a fault, too.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"

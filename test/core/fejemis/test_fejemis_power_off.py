@@ -40,9 +40,9 @@ def assert_still_refused(bench: Bench) -> None:
 
 
 def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
-    """The user calls ~/start during an e-stop.
+    """A power off is pending, and the e-stop is latched. Then the user calls ~/start.
 
-    The driver sends only ``on``, and the power stays on.
+    The driver sends only ``on``. This line cancels the power off, so the power stays on.
     """
     bench.estop(True)
     bench.session.request(Request.START, None, bench.now)
@@ -55,8 +55,8 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
     """The boards fall silent during a power off. Then the user calls ~/start.
 
-    This call ends the power off, and the driver reports the power off as failed. The boards have
-    sent nothing since the call, so the driver does not confirm ~/start.
+    This call ends the power off, which the driver reports as failed. The driver does not confirm
+    ~/start, because the boards have sent nothing since the call.
 
     ``closes``: whether the ports close right after the call.
     """

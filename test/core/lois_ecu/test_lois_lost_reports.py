@@ -74,10 +74,9 @@ def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: floa
 
 
 def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
-    """The covariance includes the distance that the robot drives after a lost stop.
+    """The line is interrupted in both directions. The user commands a stop, which does not arrive.
 
-    The line is interrupted in both directions. Meanwhile, the user commands a stop, which does not
-    arrive. So the robot drives on.
+    So the robot drives on. The covariance includes the distance that it drives.
     """
     rig = Rig(nominal("firmware"), HOST_GAINS)
     rig.run(4.0)
@@ -90,11 +89,11 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 
 
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
-    """The covariance includes the error that occurs if a wheel rests and most reports are lost.
+    """Most reports are lost. All reports that arrive have the same speed of the right wheel.
 
-    All reports that arrive have the same speed of the right wheel. The board repeats the last speed
-    of a wheel at rest. So the right wheel may be at rest, and the estimated heading may be wrong.
-    The standard deviation of the heading is at least half of the possible heading error.
+    The board repeats the last speed of a wheel at rest. So the right wheel may be at rest, and the
+    estimated heading may be wrong. The covariance includes this error: the standard deviation of
+    the heading is at least half of the possible error.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):

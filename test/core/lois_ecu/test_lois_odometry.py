@@ -205,8 +205,7 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
     """After a tick report, the odometry predicts motion. Then the user changes a setting.
 
-    The next tick report contains the motion that was predicted before. The pose still contains this
-    motion only once.
+    The next tick report contains the same motion. The pose contains it only once.
     """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
@@ -281,8 +280,8 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
     """On an inverted board, the board's left wheel is the robot's right wheel.
 
-    The simulated board is not inverted, so the estimated yaw is the simulated yaw with the other
-    sign.
+    In this test, the driver's settings say that the board is inverted, but the simulated board is
+    not. So the estimated yaw is the simulated yaw with the other sign.
     """
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)
@@ -298,8 +297,8 @@ def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
 ) -> None:
     """With the board's own gains, a wheel's speed may oscillate between two reports.
 
-    A report with more ticks than expected is a sign of this. After such a report, the odometry
-    increases the variance of the speeds that it predicts.
+    The sign of such an oscillation is a report with more ticks than expected. After such a report,
+    the odometry increases the variance of the speeds that it predicts.
     """
 
     def variance() -> float:

@@ -77,7 +77,7 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(name: str, with_sum:
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """Adjacent characters of two successive lines are lost, but fewer than a line has.
+    """A run of adjacent characters is lost from successive lines. The run is shorter than a line.
 
     The remaining characters never form another valid line.
     """
@@ -106,11 +106,11 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """Adjacent characters of a motion line and the LED's line are lost, as many as a line has.
+    """A motion line and an LED line follow each other. A run of adjacent characters is lost.
 
-    If the motion line comes first, the remaining characters may be a wrong motion line. To prevent
-    this, the driver sends the LED's line at least 15 ms after a motion line. If the LED's line
-    comes first, there is no danger.
+    The run is exactly as long as a line. If the motion line comes first, the remaining characters
+    may be a wrong motion line. To prevent this, the driver sends the LED line at least 15 ms after
+    a motion line. If the LED line comes first, there is no danger.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

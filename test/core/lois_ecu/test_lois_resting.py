@@ -44,8 +44,8 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
     """The reported speed falls from 60 to 28 RPM, and then the board repeats 28 RPM for long.
 
-    No rolling wheel is so steady. So the wheel is at rest, and 28 RPM is a wrong value: the board
-    noticed a tick late.
+    No rolling wheel is that steady, so the wheel is at rest. But a wheel does not stop directly
+    from a speed as high as 28 RPM. So the value of 28 RPM is wrong: the board noticed a tick late.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -93,10 +93,10 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """Both wheels have the same speed, which the board does not report. It is estimated at 28 RPM.
+    """While both wheels have the same speed, the board does not report it. The estimate is 28 RPM.
 
-    Then the board reports 14 RPM several times. This is a fall, compared with the estimate. So the
-    wheel is at rest.
+    Then the board reports 14 RPM several times. Compared with the estimate, the speed has fallen
+    and is then constant. So the wheel is at rest.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -109,8 +109,9 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
     """Most reports are lost. In the reports that arrive, the speed falls from 25 to 9 RPM in 1 s.
 
-    This seems to be a slow fall, because a report arrives only every 0.5 s. But it counts as a
-    fall, so repeated reports of 9 RPM prove that the wheel is at rest.
+    Usually, a fall that takes 1 s is too slow to count. But a report arrives only every 0.5 s, so
+    the true fall may have been faster. So the fall counts, and repeated reports of 9 RPM prove that
+    the wheel is at rest.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
@@ -119,7 +120,8 @@ def test_a_fall_in_gaps_between_reports_is_seen() -> None:
 def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
     """Most reports are lost. The reported speed falls by 6 RPM, which would usually be too little.
 
-    But the beginning of the fall may be in a gap, so the wheel is probably at rest.
+    Here, the fall may have begun in a gap, and may be larger than it seems. So the wheel is
+    probably at rest.
     """
     assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
     assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
@@ -129,8 +131,9 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """Most reports are lost. In the reports that arrive, the speed never falls: it rises to 14 RPM.
 
-    The speed may have fallen in a gap. If 14 RPM is then reported many times, this proves that the
-    wheel is at rest. Without lost reports, it would show that the wheel rolls.
+    Still, the speed may have fallen in a gap, as it does before a wheel comes to rest. So if the
+    board then reports 14 RPM many times, the wheel is at rest. If no reports were lost, there was
+    no fall, and the same reports show that the wheel rolls.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
@@ -143,7 +146,8 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 def test_reports_that_are_read_late_are_not_lost() -> None:
     """A busy computer reads three reports at once, 0.4 s after the three reports before them.
 
-    No report was lost in these 0.4 s. So a constant speed shows that the wheel rolls.
+    Such a pause does not mean that reports were lost, so no fall of the speed was missed. The
+    constant speed therefore shows that the wheel rolls.
     """
     wheel = told(13, 13, 13)
     for _ in range(10):

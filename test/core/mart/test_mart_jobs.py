@@ -80,8 +80,8 @@ def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
     """Without a dock, the robot drives no farther than the permitted distance.
 
-    The driver requests less than this distance, because the server's moves go farther than
-    requested. Obstacles do not end a docking move.
+    The limit matters, because obstacles do not end a docking move. The server's moves go farther
+    than requested, so the driver requests less than the permitted distance.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))

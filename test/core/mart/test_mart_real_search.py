@@ -28,8 +28,8 @@ def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> N
     IMU dies, no motion begins more than 0.25 s later. At the end of such a trial, the robot is at
     rest, or the driver has reported that it has lost the server.
 
-    Each seed is one trial, in which the user has two wishes one after the other. Among the eight
-    seeds, each of the four faults occurs, and each wish is the first wish of some trial.
+    Each seed is one trial. In a trial, the user makes two requests (``WISHES``), one after the
+    other. The eight seeds include each fault, and each kind of request as the first of the two.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))
@@ -49,10 +49,10 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during a forward drive. Its first command to arrive is SL (stop port).
+    """A driver starts during a forward drive. At first, the network is interrupted.
 
-    The network was interrupted until then. After SL, the driver does not send SRM, the usual stop
-    of a forward drive: SRM would hang the server.
+    The first command that arrives is SL (stop port). After SL, the driver does not send SRM, the
+    usual stop of a forward drive: SRM would hang the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""

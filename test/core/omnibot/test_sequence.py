@@ -43,8 +43,8 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
     """The board is paused, and then continues with the next count. No delta is counted as lost.
 
-    The duration of the first delta after the pause is unknown. If its count is 0 (after 255), the
-    driver assumes a restart, because a restarted board begins at 0.
+    The duration of this delta is unknown. A count of 0 (after 255) is a special case: a restarted
+    board begins at 0, so the driver assumes a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -122,7 +122,7 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
     """A pose comes after every fifth delta. The counter of a pose shows that three deltas are lost.
 
-    The pose reports these losses. So the next delta does not report them again.
+    These losses are counted when the pose arrives. The next delta does not count them again.
     """
     sequence = Sequence()
     for count in range(10):
@@ -154,8 +154,8 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
     """Deltas are lost for more than 1 s. Then a pose arrives before the next delta.
 
-    The pose's counter shows the losses. By chance, it may fit the last delta's count as it does
-    after a restart. But after such a long gap, no restart is assumed.
+    The pose's counter shows the losses. By chance, it may be a counter that is also possible after
+    a restart. But after such a long gap, no restart is assumed.
     """
     sequence = Sequence()
     for count in range(300):
@@ -217,9 +217,9 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """The board's pose counter begins at 0 again, after only 1 s. No pose is counted as lost.
+    """The board's pose counter begins at 0 again, after only 1 s. No losses are counted.
 
-    In 1 s, the board sends too few poses for a wrap of this counter.
+    The counter has not wrapped, because a wrap needs more poses than the board sends in 1 s.
     """
     sequence = Sequence()
     for count in range(25):
@@ -230,9 +230,9 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnect, the count fits neither a restart nor lost deltas: it is another board.
+    """After a reconnect, the line leads to another board, so the next count can be any number.
 
-    The result is the same as for a restart.
+    The result is the same as for a restart, although this count is too high for a restarted board.
     """
     sequence = begun(7)
     sequence.reconnect()
@@ -252,9 +252,9 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """100 deltas are lost while the host's clock stops. So the next count seems far too high.
+    """The host's clock stops, and 100 deltas are lost. By this clock, the next count is too high.
 
-    The driver counts these losses only after the following delta has confirmed this count.
+    The driver counts the losses only when the following delta continues this count.
     """
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
@@ -276,7 +276,7 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
     """A delta is lost. The next pose and the next delta are decoded late, almost at the same time.
 
-    The pose reports the lost delta, so the next delta does not report it again.
+    The loss is counted when the pose arrives. The next delta does not count it again.
     """
     sequence = Sequence()
     for count in range(11):

@@ -25,9 +25,10 @@ def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_cam
 
 
 def test_an_overrun_of_the_port_is_blamed_only_for_frames_lost_at_about_its_time() -> None:
-    """The port overruns, and an hour later frames are lost. The notice does not name the overrun.
+    """The port overruns, and an hour later frames are lost. The notice is not about the overrun.
 
-    If frames are lost at about the time of an overrun, the notice names the overrun as the cause.
+    Then frames are lost at about the time of another overrun. This notice names the overrun as the
+    cause.
     """
     notices, none = Notices(), Refused(0, 0, 0)
     assert notices.counted(0, 0, none, 100.0) == []
