@@ -97,8 +97,8 @@ def unit_settings() -> dict[str, list[str]]:
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
     """The systemd unit starts the driver by ``exec``, so signals reach the driver itself.
 
-    No shell stays in between. The command gives a parameter file, but no port. The port is in this
-    file, because each board has other ports.
+    No shell stays in between. The command names a parameter file, but no port. The file contains
+    the port, because the names of the port parameters depend on the board.
     """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command

@@ -237,10 +237,10 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """A monitor that SIGSTOP has suspended still restores the terminal at its end.
+    """SIGSTOP suspends the monitor, which has no time to restore the terminal before that.
 
-    SIGSTOP leaves the monitor no time to restore the terminal before the suspension. After the
-    suspension, the monitor draws its screen again. Then the user presses q, and the monitor ends.
+    After the suspension, the monitor draws its screen again. Then the user presses q. The monitor
+    restores the terminal and ends.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

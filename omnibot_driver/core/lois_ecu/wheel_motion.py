@@ -24,11 +24,9 @@ X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 distance of both wheels, in m. The filter predicts the board's odometry (0x20) from ``TURN`` and
 ``ALONG``.
 
-``BIAS``: index of the left wheel's state; the right wheel's state follows it. The state is the
-error of the wheel's speed.
-
-``EXCESS``: index of the left wheel's state; the right wheel's state follows it. A wheel that rolls
-backward is faster than its set-point. The state is this excess, as a fraction of the set-point.
+``BIAS``: error of a wheel's speed. ``EXCESS``: a wheel that rolls backward is faster than its
+set-point by this fraction of the set-point. Both are states of each wheel: the index is that of the
+left wheel's state, and the right wheel's state follows it.
 """
 STATES: Final = 18
 

@@ -22,8 +22,8 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: limit as long as the driver has not learned from a turn. It is valid only in the first
-EARLY_S (s) of a steady rate.
+``OFF``: limit in the first EARLY_S (s) of a steady rate, if the driver has not learned from a turn
+yet.
 
 ``OFF_AGAIN``: limit in all other cases. It is larger, because a new start disturbs the robot's
 motion more than a small error of the rate.

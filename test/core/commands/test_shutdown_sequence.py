@@ -116,10 +116,10 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """At shutdown, the driver does not wait for a paused board to prove that the robot is at rest.
+    """A paused board sends no displacements, so it cannot prove that the robot is at rest.
 
-    A paused board sends no displacements that could prove it. But its motors are off, so the driver
-    takes the robot to be at rest.
+    But its motors are off, so the driver assumes that the robot is at rest. At shutdown, it does
+    not wait for a proof.
     """
     bench = paused()
     left(bench)

@@ -165,10 +165,10 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     firmware: Firmware,
 ) -> None:
-    """After a stop, the wheels of a heavy robot turn for another 1.3 s.
+    """After a stop or an e-stop, the wheels of a heavy robot turn for another 1.3 s.
 
     The server waits only 0.6 s for the end of the motion, and then reports a failure. The driver
-    does not report that the robot moves without a command. Every second stop is an e-stop.
+    does not report that the robot moves without a command.
     """
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):
