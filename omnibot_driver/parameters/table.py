@@ -83,8 +83,11 @@ DISPENSABLE: Final = frozenset(
 """Common parameters that a board may omit. A board must have all other common parameters that fit
 its traits, because the driver reads them."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""Values of the parameter ``on_exit`` besides ``stop``, each with its request. A board offers a
-value only if it supports this request."""
+"""Values of the parameter ``on_exit`` besides ``stop``.
+
+Each is mapped to the request that the driver sends at its exit. A board offers a value only if it
+supports this request.
+"""
 
 
 @dataclass(frozen=True, slots=True)

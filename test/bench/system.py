@@ -264,7 +264,8 @@ def latencies(
 ) -> list[tuple[float, float]]:
     """Return, for each message, when its frame was delivered, in s, and its latency, in µs.
 
-    ``unit``: a message contains a number from its frame, multiplied by this factor.
+    The function finds the frame by its number. ``unit``: the value in a message is the number of
+    its frame, multiplied by this factor.
     """
     found = []
     for at, value in heard:

@@ -21,8 +21,8 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-This time is longer than the command timeout. The reason: if the driver had no data, it does not
-know whether the robot moves, and must receive measurements before it can act.
+A driver that had no data does not know whether the robot moves. It can act only after it has
+received measurements. For this reason, the time is longer than the command timeout.
 """
 
 

@@ -67,9 +67,10 @@ class Forked:
 
 
 class Nursery:
-    """The connection to one process, which imports the driver and forks a process for each driver.
+    """The connection to the process that forks the drivers.
 
-    This process starts with the first driver, and ends with the tests.
+    This process imports the driver once, and then forks a new process for each driver. It starts
+    with the first driver, and ends with the tests.
     """
 
     def __init__(self) -> None:

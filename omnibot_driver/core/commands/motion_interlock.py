@@ -57,9 +57,9 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        If the board has no ~/start, the release ends the refusal of motion after the monitor's
-        second stop within 60 s. It does not end the refusal after a first stop. If the board has
-        ~/start, only ~/start ends the refusal after the second stop.
+        The release does not end a refusal after the monitor's first stop. It ends a refusal after
+        the second stop within 60 s, but only if the board has no ~/start. If the board has ~/start,
+        only ~/start ends this refusal.
         """
         if self.until is Until.ESTOP:
             self.start()
@@ -72,9 +72,9 @@ class MotionInterlock:
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
         """Record that a sender of commands was active at ``now``, which can prolong a refusal.
 
-        The refusal after a first stop by the monitor ends after ``timeout_s`` without commands. If
-        it has not ended yet, this time begins again at ``now``. Call this method when a command is
-        refused, and after a stall of this process.
+        After a first stop by the monitor, motion is refused until no command has arrived for
+        ``timeout_s``. If the refusal still continues at ``now``, the wait for ``timeout_s`` begins
+        again. Call this method when a command is refused, and after a stall of this process.
 
         ``stalled_s``: length of the stall, in s. A stall is not regarded as time without commands.
         """

@@ -112,9 +112,10 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist of the robot's body that ``packets`` command.
 
-        The caller passes packets that were sent. If they are the last result of ``encode``, and are
-        passed for the first time, the result is the twist that ``encode`` has computed for the
-        front wheel's angle. All other packets are regarded as a stop.
+        The caller passes packets that were sent. ``encode`` stores its last packets, together with
+        the twist that it has computed for the front wheel's angle. If ``packets`` are equal to the
+        stored ones, the result is the stored twist. All other packets are regarded as a stop. Each
+        call deletes the stored packets, so they are used only once.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

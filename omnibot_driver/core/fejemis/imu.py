@@ -22,10 +22,13 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit for the time between the arrivals of two successive samples, in sampling periods.
 
-The driver uses this limit only if both samples seem to be late by about a period or more. If the
-time between the two arrivals is above the limit, the samples are not late: they only seem to be,
-because an earlier sample was lost. If the time is below the limit, the host has stalled. Both
-samples have then waited to be read, and no sample was lost.
+The driver uses this limit only if both samples seem to be late by about a period or more. There are
+two possible causes:
+
+* An earlier sample was lost. Then both samples are in time, and arrive about one period apart. The
+  time between their arrivals is above the limit.
+* The host has stalled. Then both samples have waited, and are read shortly after one another. The
+  time between their arrivals is below the limit, and no sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""

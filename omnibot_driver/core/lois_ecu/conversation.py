@@ -169,9 +169,10 @@ class LoisConversation:
 
     @property
     def held_until(self) -> float:
-        """Time at which ``receive`` with b"" returns the reports that are held back.
+        """Time at which the caller must call ``receive`` with b"".
 
-        It is infinity if no report is held back.
+        This call returns the readings of the reports that are held back. The time is infinity if
+        there are none.
         """
         return self._decoder.resolves_at
 
@@ -186,10 +187,10 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the robot is at rest after a Stop; None if tick reports do not show it.
+        """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Old tick reports do not show it. After a backward command or RPM 0/0, the tick reports of
-        the public firmware do not show it either.
+        Two kinds of tick reports do not show a standstill: old ones, and those that the public
+        firmware sends after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -270,8 +271,9 @@ class LoisConversation:
     def emergency_stop(self) -> bytes:
         """Return the set-points RPM 0/0; in a terminal mode, return no bytes.
 
-        In a terminal mode, the public firmware reads at most 480 characters a second. So in this
-        mode, the driver sends only the Stop (``stop``), and no set-points.
+        In a terminal mode, the public firmware reads at most 480 characters a second, so the
+        set-points would delay the Stop. For this reason, the driver sends only the Stop (``stop``)
+        in this mode.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 

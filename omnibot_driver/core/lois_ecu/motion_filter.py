@@ -99,9 +99,10 @@ class MotionFilter:
         self.differing_mps = math.inf
         """Smallest expected difference between the two measured wheel speeds, in m/s.
 
-        The driver searches this minimum anew after each comparison of the distance that the board
-        reports with the estimated distance. The difference matters because the public firmware does
-        not change the reported position while both speeds are equal.
+        It is the minimum since the last comparison of the distance that the board reports with the
+        estimated distance. While both speeds are equal, the public firmware does not change the
+        reported position. The difference shows whether this may have happened since the last
+        comparison.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
@@ -127,7 +128,7 @@ class MotionFilter:
         return ROUNDED * self.rpm_mps
 
     def shown_mps(self, wheel: int) -> float:
-        """Return the estimated speed that the firmware has measured last, in m/s, with sign."""
+        """Return an estimate of the speed that the firmware measured last, in m/s, with sign."""
         held = self.filter.mean[PER_WHEEL * wheel + HELD] - self.rounded_mps(wheel)
         return self.wheels[wheel].course.measured_sign * max(held, 0.0)
 
@@ -193,8 +194,9 @@ class MotionFilter:
 
         ``stddev_m``: standard deviation to add to the distance.
 
-        ``counted``: whether the board was still counting the wheel's ticks when the distance became
-        uncertain, even if it does not count them now.
+        ``counted``: whether the board counted the wheel's ticks at the time of the error. In this
+        case, the number of counted ticks becomes uncertain too, even if the board does not count
+        ticks now.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)

@@ -42,27 +42,28 @@ TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TURNS: Final = 0.3
 RESTARTED_TICKS: Final = 2
 RESTARTED_TURNS_PER_S: Final = 1.0
-"""Largest decrease of a count that a wheel can cause when it rolls back.
+"""The largest plausible decrease of a wheel's count from one tick report to the next.
 
-This decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, and
-``RESTARTED_TICKS`` ticks more. If a count decreases by more than this, the board has restarted.
+A wheel that rolls back decreases its count. In ``duration`` seconds, it can roll back by
+``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, plus ``RESTARTED_TICKS`` ticks. If a
+count decreases by more than this, the board has restarted.
 """
 SILENT_S: Final = 1.0
-"""Longest time in s without tick reports after which rolling wheels can still explain small counts.
+"""Limit, in s, for the time without tick reports, used to detect a restart of the board.
 
 If the counts are near zero and the clock is irregular, there are two explanations: the board has
-restarted, or the wheels have rolled back. If no tick report came for longer than this limit, the
+restarted, or the wheels have rolled back. If the time without tick reports is above the limit, the
 driver assumes a restart.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Limit, in s, for the time in which the wheels may have rolled back.
+"""Limit, in s, that is used if the clock does not confirm the time since the last tick report.
 
 To detect a restart, the driver computes how far the wheels may have rolled back since the last tick
-report. Usually the computation uses the whole time since that report. If the unit of the board's
-clock has just become unknown, the clock cannot confirm this time. Then the computation uses at most
-this limit.
+report. Usually it computes with the whole time since that report. But if the unit of the board's
+clock has just become unknown, the clock does not confirm this time. In this case, the driver
+computes with this limit if the time is longer.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s, from the first counts after a reset, in which counts may still be from before the
@@ -250,12 +251,15 @@ class Translation:
         return []
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start, assumed to be after the previous report.
+        """Return the time in s since the board's start; None if it is unknown.
 
-        The board's clock begins at zero at the start, so this time is the clock's value. The result
-        is None if the clock's unit is unknown. A clock in ns also wraps to zero every 4.3 s. Then
-        the result is None unless the previous report is less than 4.3 s old, and the clock's value
-        is at most this age.
+        The caller assumes that the board was started after the previous report. The board's clock
+        begins at zero at the start, so the time since the start is the clock's value. It is unknown
+        if the clock's unit is unknown.
+
+        A clock in ns also begins at zero again every 4.3 s. Its value is used only if two
+        conditions hold: the previous report is less than 4.3 s old, and the value is not larger
+        than the age of that report.
 
         ``ticks``: the new report. ``duration_s``: time in s since the previous report.
         """

@@ -74,8 +74,8 @@ COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 
 The variance grows by one of these factors, times the square of the relative change.
 
-``COPIED``: the factor if the change may arrive twice. This is possible if queries take longer than
-``SLOW_TRIP_S`` (s).
+``COPIED``: the factor if the network may deliver the change twice. The driver assumes this if
+queries take longer than ``SLOW_TRIP_S`` (s).
 
 ``MISSED``: the factor if the server did not answer the change.
 
@@ -148,7 +148,10 @@ class SpeedLoop(Motors):
         return max(self._least_units, units)
 
     def started(self) -> None:
-        """Record that the motors have turned after a start. Later starts may need fewer units."""
+        """Record that the motors have turned after a start.
+
+        The next start may use one unit less.
+        """
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
@@ -156,8 +159,9 @@ class SpeedLoop(Motors):
 
         ``units``: the units that both motors have; None for the current units of each motor.
 
-        A motor with MOST_DEAD units or more is regarded as blocked, so the driver learns nothing
-        from it.
+        The driver learns from this that these units are not enough to turn the motor. It does not
+        learn from a motor with MOST_DEAD units or more: such a motor is blocked, because these
+        units are enough.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -222,10 +226,12 @@ class SpeedLoop(Motors):
         *,
         right_only: bool = False,
     ) -> None:
-        """Learn from a displacement measured over ``seconds``. Update the heading error, too.
+        """Use a displacement, measured over ``seconds``, to learn how fast the motors turn.
 
-        ``right_only``: whether only the right wheel was measured. In this case, the left
-        ``MotorLine`` changes by the same amounts as the right ``MotorLine``.
+        The displacement also updates the heading error.
+
+        ``right_only``: whether only the right wheel was measured. In this case, the ``MotorLine``
+        of the left wheel is changed by the same amounts as that of the right wheel.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

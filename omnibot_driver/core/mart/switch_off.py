@@ -90,8 +90,9 @@ class SwitchOff:
     def missed(self, word: Word) -> bool:
         """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
 
-        After MOST_MISSES unanswered requests in a row, the driver allows motions again. If the last
-        of these requests was MCS, the driver also stops using MCS until the next connection.
+        After MOST_MISSES unanswered requests in a row, the driver no longer repeats the request,
+        and allows motions again. If this request was MCS, the driver does not use MCS again until
+        the next connection.
 
         The server may still execute an unanswered MCS later, and then refuses the next motion. If
         this happens, the driver sends MSM, which ends the direct control by MCS.

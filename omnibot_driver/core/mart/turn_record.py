@@ -25,7 +25,10 @@ records show. When the sum reaches ENOUGH_RAD, it downloads no more records.
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
 UNRECORDED: Final = 3
-"""Number of downloads in a row without a usable record after which the driver downloads no more."""
+"""Limit for failed downloads. A download fails if it does not bring a usable record.
+
+After this number of failed downloads in a row, the driver downloads no more records.
+"""
 _HEAD: Final = re.compile(
     rb"MC Spin sensor data log\r?\n"
     rb".*\nTarget motion \([^)]*\): (?P<asked>\d+\.\d+)\r?\n"

@@ -31,8 +31,8 @@ FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
-``FORGOTTEN_AT_REST_S`` applies while the robot is commanded to rest. It is longer, because the
-wind-up of a robot that is held at rest decays more slowly.
+``FORGOTTEN_AT_REST_S`` applies while the robot is commanded to rest, ``FORGOTTEN_S`` while it is
+commanded to move. A robot that is held at rest keeps its wind-up for longer.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""

@@ -59,7 +59,7 @@ class InterFrameGaps:
     * ``between``: whether the read after a pause normally contains the beginning of a frame.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
       further confirmations are not counted.
-    * ``at_pace``: whether the line was not idle between the previous read and the last one.
+    * ``at_pace``: whether the line was busy for the whole time between the last two reads.
     * ``collected``: whether an adapter collected the bytes of the last read for more than a tick.
     """
 
@@ -151,9 +151,10 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether the bytes from ``start`` on arrived within half a tick, after a pause.
+        """Return whether the bytes from ``start`` on came quickly, and after a short pause.
 
-        If this pause was longer than ``LATE_S``, the result is False.
+        All of these bytes must have come within half a tick, directly after a pause of at most
+        ``LATE_S``.
         """
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:

@@ -2,8 +2,9 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-If the line is idle within a frame, bytes were lost there. All later frames then seem late by whole
-ticks. If only the reader was late, later frames are on time again.
+If the line was idle within a supposed frame, bytes were lost there: the beginning and the end of
+the supposed frame come from different ticks. So all later frames seem late by whole ticks. If only
+the reader was late, later frames are in time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
 contains, or which frames are accepted.
@@ -27,9 +28,9 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.schedule import TICK_S
 
 IDLE_S: Final = 0.1
-"""Pause in s that is longer than any that an adapter causes (16 ms): ten of the board's ticks."""
+"""Long pause in s: ten of the board's ticks. An adapter only causes pauses of 16 ms or less."""
 HALF_TICK_S: Final = TICK_S / 2
-"""Delay in s below which a frame is regarded as sent in its own tick (10 ms)."""
+"""Half of a tick, in s. A frame that is late by less than this is regarded as in time."""
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board within a frame."""
 NEAR_S: Final = 2e-3
@@ -47,7 +48,7 @@ The check compares the time in which the bytes arrived with the time that the li
 them. If the two times differ by less than this tolerance, the bytes did not wait for the reader.
 """
 FEW_BYTES: Final = 2
-"""Largest number of bytes that is too small to measure how fast the bytes arrive."""
+"""Number of bytes. The driver measures how fast bytes arrive only if there are more than this."""
 TICKS_TO_PROVE: Final = 2
 """If this number of further late ticks follows a first late tick, bytes were lost.
 
@@ -167,9 +168,12 @@ def _by_the_next_frame(
 ) -> Cause:
     """Return the cause of a pause within a frame, as far as the next frame shows it.
 
-    The line was idle if the next frame also contains a pause, and if the two pauses end a whole
-    number of ticks apart. ``start``: position of the next frame. ``first``: the read that ended the
-    pause in the first of the two frames.
+    The two frames may be wrong: each may consist of parts of two real frames, with the idle time
+    between them. These idle times end a whole number of ticks apart. So the line was idle if the
+    next frame also contains a pause, and if the two pauses end a whole number of ticks apart.
+
+    ``start``: position of the next frame. ``first``: the read that ended the pause in the frame
+    before.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

@@ -35,9 +35,9 @@ zeros wake a board. Three zeros are enough for this.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-The end of the previous frame may be lost. Then the board takes the zeros for the lost bytes, and
-obeys a wrong command. For this reason, only a few zeros are sent: the motion frame follows soon,
-and replaces the wrong command.
+The previous frame may have lost its end. Then the zeros complete it, and the board may obey a wrong
+command. The motion frame replaces this command. It follows sooner after four zeros than after the
+eight of ``ZEROS``.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

@@ -52,12 +52,12 @@ The load changes slowly. Therefore residuals are correlated even at this distanc
 MISSED: Final = 0.42
 """Limit for the sum of the relative errors of two successive times between ticks.
 
-A larger sum means that the board missed a mark. The first time then covers two distances between
-marks, so it is twice as long as expected. Its relative error is 1, and so the sum is about 1. The
-board's clock can lose up to 6 ms, which makes the sum smaller.
+If the sum is larger, the board has missed the mark at the end of the earlier time. The earlier time
+then covers two distances between marks, so it is twice as long as expected. Its relative error is
+1, and the sum is about 1. The board's clock can lose up to 6 ms, which makes the sum smaller.
 
-The board may also notice a mark late. Then the first time is too long and the second too short, so
-the sum is near 0, which is below the limit.
+The board may also notice a mark late. Then the earlier time is too long, and the later one is too
+short. The sum is near 0, which is below the limit.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which no missed mark is searched for.
@@ -231,9 +231,9 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the plant's own values, which are the same in all records.
 
-        The load changes slowly, so it can differ from record to record. Then the results of the
-        records can scatter more than the residuals predict. In this case, this method increases the
-        covariance until it covers the scatter.
+        The covariance is computed from the residuals. But the load changes slowly, so it can differ
+        from record to record, and the results of the records can differ by more than the residuals
+        predict. If they do, this method increases the covariance until it covers these differences.
         """
         own = 1 + self.order
         found = self._search(values)

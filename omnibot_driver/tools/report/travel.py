@@ -15,11 +15,11 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad. A step of the pose that exceeds one is a leap.
+"""``LEAP_M``, ``LEAP_RAD``: limits, in m and rad, above which a step of the pose is a leap.
 
-They limit the difference between two motions in the step from one message to the next: the change
-of the pose, and the motion that the twist shows. The driver's own corrections of odom do not exceed
-the limits, because fastest_linear_speed limits these corrections.
+A step goes from one message to the next. The limits apply to the difference between the change of
+the pose in the step and the motion that the twist shows. The driver's own corrections of odom do
+not exceed the limits, because fastest_linear_speed limits these corrections.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05

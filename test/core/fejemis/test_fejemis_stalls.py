@@ -58,9 +58,10 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The robot drives a curve while the driver stalls. The odometry contains this whole motion.
 
-    No line of the boards is lost. But if the driver does not notice the stall, it rejects lines
-    that are more than 1 s late. The first displacement after the stall then covers seconds, and the
-    second one covers 20 ms. The driver regards neither of these two displacements as implausible.
+    No line of the boards is lost. In some of the cases, the driver does not notice the stall. It
+    then rejects lines that are more than 1 s late, but the first displacement after the stall also
+    covers the time of the rejected lines. So the first displacement covers seconds, and the second
+    one covers 20 ms. The driver regards neither of these two displacements as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -100,9 +101,9 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """The driver needs long for the first read after a stall, so the second read is late too.
 
-    Bytes are lost between the two reads. The driver does not publish the first sample after these
-    bytes: no pose has arrived between the bytes and the sample, so its time is unknown. All other
-    samples get the times at which the board took them.
+    Bytes are lost between the two reads. The sampling time of a sample that arrives after lost
+    bytes is unknown until the next pose arrives. So the driver does not publish the first sample
+    after the lost bytes. All other samples get the times at which the board took them.
     """
     bench = nominal()
     bench.run(1.0)

@@ -140,10 +140,10 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 
 
 def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
-    """If both boards lose their power, refusals soon say that the boards send no data.
+    """Both boards lose their power, and the ports stay open. The driver refuses motion commands.
 
-    The ports stay open. At first, the driver's reads may be late, so a refusal of a motion command
-    says that nothing was read. Later, it says that the boards send no data.
+    At first, the driver cannot exclude that only its own reads are late. So the refusal says that
+    nothing was read. A few seconds later, the refusal says that the boards send no data.
     """
     bench = nominal()
     bench.drive_on()

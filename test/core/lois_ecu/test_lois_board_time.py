@@ -48,7 +48,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 def test_its_error_is_that_of_the_reads() -> None:
     """If reads are up to 30 ms late at random, the estimated standard deviation is 5 to 25 ms.
 
-    It is the standard deviation of the estimated delay.
+    The driver estimates the delay of each read, and the standard deviation of this estimate.
     """
     board, random = BoardTime(), Random(1)
     for step in range(100):
@@ -112,9 +112,9 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """A jump of the board's clock makes the delay of the next tick report irregular.
 
-    All reads are in time. The board's clock jumps by 0.05 s or 0.2 s, ahead or back. The estimated
-    delay of the next report changes by the same amount. Without the jump, the delay would not be
-    irregular.
+    All reads are in time, so the estimated delay is usually about 0. Then the board's clock jumps
+    by 0.05 s or 0.2 s, ahead or back. The estimated delay of the next report differs from 0 by as
+    much.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -128,8 +128,8 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
     """If reads are often late, one more late read is not irregular.
 
-    Reads are up to 0.1 s late at random. A read that is 0.1 s late is then not irregular. But a
-    read that seems 0.06 s early is irregular, because no read can be early.
+    Reads are up to 0.1 s late at random. One more read that is 0.1 s late is therefore not
+    irregular. But a read that seems 0.06 s early is irregular: late reads do not explain it.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

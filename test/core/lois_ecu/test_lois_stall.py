@@ -132,8 +132,9 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel can roll at a constant speed above its set-point.
 
-    So a constant reported speed alone does not show that the wheel is at rest. It shows this only
-    if the other wheel's speed changes meanwhile.
+    Without feed-forward, such a wheel would get no power and become slower. So only without
+    feed-forward, the constant reported speed shows that the wheel is at rest. With feed-forward, it
+    shows this only if the other wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -152,10 +153,11 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """The board reports both wheels at 1.3 times their set-points. So both wheels really roll.
+    """The board reports both wheels at 1.3 times their set-points. No wheel looks stalled.
 
-    If the board reports only one wheel at such a speed, this wheel looks stalled: the board may be
-    repeating the last speed of a wheel that is at rest.
+    In backward motion, wheels that roll can be too fast, but both by about the same factor. So both
+    wheels really roll. If only one wheel is reported at such a speed, this wheel looks stalled: the
+    board may be repeating the last speed of a wheel that is at rest.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
@@ -174,10 +176,10 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """A wheel rests, and the board reports a speed below its set-point.
+    """A wheel is at rest, and its last reported speed is below its set-point.
 
-    The controller gives the wheel power, so the wheel starts by itself. Therefore, the wheel is not
-    reported as stalled.
+    The board keeps reporting this speed. The speed controller uses it too, so it gives the wheel
+    power, and the wheel starts by itself. Therefore, the wheel is not reported as stalled.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -208,9 +210,10 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 ) -> None:
     """The right wheel's reported speed stays the same while the left wheel's speed varies.
 
-    So the right wheel may be at rest. It may also roll, because its reported speed is high. The
-    driver sends RPM 0/0 to start the wheel again. If the wheel has rolled, the odometry keeps the
-    distance.
+    The board may be repeating an old speed of a right wheel that is at rest. But the reported speed
+    is higher than the speeds that the board usually repeats, so the wheel may also roll. The driver
+    sends RPM 0/0. This clears the old speed, so that a wheel at rest starts again. The driver does
+    not subtract the right wheel's distance from the odometry, because the wheel may have rolled.
 
     ``right_rpm``: reported speed of the right wheel. Its set-point is −31 RPM. At −68 RPM, the
     controller of the wheel is saturated and keeps full power.

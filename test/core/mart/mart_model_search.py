@@ -24,9 +24,12 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    A crash of the server is always a fault. If the IMU is dead, or if the driver has given up, a
-    crash is the only fault. While the driver finds out which motion is in progress, there is a
-    second fault: a command port that hangs. At other times, there are further faults.
+    What is wrong depends on the situation:
+
+    * If the IMU is dead, or if the driver has given up: only a crash of the server.
+    * While the driver finds out which motion is in progress: a crash, and a command port that
+      hangs.
+    * At all other times: these two and further faults.
     """
     server, driver = world.server, world.driver
     if server.crashed:

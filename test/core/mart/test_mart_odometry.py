@@ -77,9 +77,9 @@ def test_a_drive_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_las
 def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_the_covariance(
     twist: tuple[float, float], quiet_s: float
 ) -> None:
-    """No reply proves to the driver that the second of two equal motions has begun.
+    """The robot makes two equal motions. No reply proves that the second one has begun.
 
-    The odometry may leave out the second motion. Then the covariance covers the error.
+    The odometry may leave out the second motion. If it does, the covariance covers the error.
     """
     after_equal_motions(twist, quiet_s)
 
@@ -256,8 +256,8 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
     """The driver waits for a missing reply. A copy of an older reply arrives instead.
 
-    The driver recognises the copy, and continues to wait. So it sends no other query whose reply
-    has the same form.
+    The driver recognises the copy, and continues to wait. Meanwhile it sends no other query whose
+    reply has the same form: the missing reply could be mistaken for the reply to this query.
     """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)

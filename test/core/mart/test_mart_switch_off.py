@@ -123,11 +123,11 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 
 
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
-    """MSM ends the direct control of the motors for good, although a copy of MCS arrives late.
+    """The driver sends MSM only when no late copy of MCS can arrive any more.
 
-    The reply to MCS (direct control of the motors) is lost, so the driver repeats MCS. The network
-    delivers a late copy of the second MCS. After MSM, this copy would begin the direct control
-    again. So the driver sends MSM only when no copy can arrive any more.
+    MCS begins the direct control of the motors, and MSM ends it. The reply to the first MCS is
+    lost, so the driver repeats MCS. The network delivers a late copy of the second MCS. If this
+    copy arrived after MSM, it would begin the direct control again.
     """
     bench = creeping()
     since = len(bench.written)
@@ -340,7 +340,8 @@ def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> 
 
     The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM. The
     server's reply ``ok`` to MSM arrives twice, and the driver's next RST IMU (check of the IMU) is
-    lost. The notice says that the server still reports a motion although the robot is at rest.
+    lost. The driver does not conclude from the second ``ok`` that the server can be stopped again.
+    It gives a notice: the server still reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

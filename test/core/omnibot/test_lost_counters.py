@@ -27,7 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 def over_a_gap(lost: int, seed: int, frame: str) -> tuple[Line, list[OdometryEstimate]]:
     """Return a simulated line, 1 s after a gap of ``lost`` deltas, and its odometry estimates.
 
-    The first estimate is the last one before the gap. The others are from the second after the gap.
+    The first of these estimates is the last one before the gap. All others are from after the gap.
     """
     on = line(seed, frame=frame)
     before = on.estimates[-1]
@@ -91,8 +91,8 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
     """After a loss of frames, no step of odom is faster than 2 m/s or 8 rad/s.
 
-    This is also true for the first step after the gap: it contains the motion of the whole gap, but
-    it also lasts as long as the whole gap.
+    The first step after the gap contains the motion of the whole gap. It also lasts as long as the
+    whole gap, so it is not faster either.
     """
     for seed in range(5 if lost < 60 else 2):
         _, estimates = over_a_gap(lost, seed, frame)
