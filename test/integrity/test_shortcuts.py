@@ -224,7 +224,8 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
     """The decoder can restore the state that it had after any earlier frame.
 
-    To restore this state, the decoder evaluates at most 6 frames again.
+    The restored states are equal to those of a decoder that evaluates all frames one by one. To
+    restore a state, the decoder evaluates at most 6 frames again.
     """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)

@@ -2,7 +2,7 @@
 
 """Requests the values that are only shown in diagnostics, one after the other.
 
-The module also requests each measurement of the sonar.
+The module also requests the measurements of the sonar, one request for each measurement.
 """
 
 import math

@@ -68,8 +68,8 @@ DUTY_STDDEV: Final = 0.3
 REVERSES_S: Final = 0.2
 """Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign.
 
-This time is uncertain, because the board does not measure when a wheel's direction changes. It
-measures only the wheel's speed.
+The board measures only how fast a wheel turns, not in which direction. So the driver does not know
+when the wheel has stopped and its direction changes.
 """
 ROLLING_MPS: Final = 1e-6
 
@@ -218,9 +218,9 @@ class MotionFilter:
             self.filter.disturb([(state, 1.0)], stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return the errors of the states if a wheel's estimated distance has an error of 1 m.
+        """Return how wrong each state is if a wheel's estimated distance is wrong by 1 m.
 
-        The result has each wrong state, with its error.
+        States that are not wrong are left out.
         """
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = self._way_terms(index)

@@ -67,10 +67,10 @@ class WindUp:
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract from the wind-up a motion that the set-points do not allow.
+        """Subtract from the wind-up the distance of a motion that the set-points do not allow.
 
-        Return whether the wind-up explains this motion. The wind-up explains it if the distance of
-        the motion is smaller than the wind-up before the subtraction.
+        Return whether the wind-up explains the motion. It does if the distance is smaller than the
+        wind-up was before this call.
 
         ``way_mps``, ``turn_radps``: by how much the velocities of the motion exceed the allowed
         velocities. ``seconds``: duration of the motion.

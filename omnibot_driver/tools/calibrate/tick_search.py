@@ -206,10 +206,10 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals, and remove it in all later searches.
 
-        ``values``: the values of the plant for which the residuals are computed.
+        The residuals are correlated for two reasons. The marks have uneven distances, until they
+        are fitted. The load changes slowly, also after the fit.
 
-        As long as the marks are not fitted, their uneven distances cause the correlation. After the
-        fit, only the changing load causes it.
+        ``values``: the values of the plant for which the residuals are computed.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)

@@ -71,9 +71,9 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """After a stall of the host, the estimated delays are soon right again.
+    """The host stalls, and then one read takes twenty tick reports at once.
 
-    The host stalls, and then one read takes twenty tick reports at once.
+    Ten reports later, the estimated delays are right again.
     """
     board = BoardTime()
     found = []

@@ -31,8 +31,8 @@ def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_secon
 ) -> None:
     """Each datagram is late by up to 0.3 s. The delays begin just before the robot drives.
 
-    The driver stops none of the four drives. In at most one of the four, the speed is still wrong
-    after 5 s.
+    The test makes four drives, each with other random delays. The driver stops none of them. In at
+    most one of them, the speed is still wrong after 5 s.
     """
     slow = 0
     for seed in range(4):
