@@ -97,8 +97,8 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        The executor checks these callbacks before it handles a command, so they would delay each
-        command.
+        With such callbacks, the executor would handle each command later, because it checks the
+        callbacks first.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)

@@ -73,8 +73,8 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
     """The driver stalls three times. Commands from before the end of the last stall are refused.
 
-    This includes commands from before the earlier stalls, because the middleware may deliver a
-    command only after several stalls.
+    A command may even come from the time before an earlier stall, because the middleware may
+    deliver it only after several stalls. Such a command is refused, too.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
@@ -88,10 +88,10 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """A command is not refused because of a stall that ended long ago.
+    """If a command seems to come from a stall that ended long ago, it is not refused.
 
-    The command seems to come from a stall that ended 98 s ago. A command cannot be in transit for
-    that time, so the sender's clock must be wrong.
+    The stall ended 98 s ago. A command cannot be in transit for that time, so the sender's clock
+    must be wrong.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)

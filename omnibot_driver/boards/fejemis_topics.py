@@ -282,9 +282,9 @@ def _why_not_request(what: str, session: Session) -> str:
 
 
 def _why_not_off(what: str, session: Session) -> str:
-    """Return why ``what`` may still be on after the command to switch it off.
+    """Return a warning that ``what`` may still be on after the command to switch it off.
 
-    The result is empty if all ports are open.
+    The warning contains the reason: a port is not open. If all ports are open, the result is empty.
     """
     why = NOT_CONNECTED if session.state == "disconnected" else session.interlocks.missing
     later = "; the driver switches it off again when all ports are open"

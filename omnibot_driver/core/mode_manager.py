@@ -24,17 +24,22 @@ The request is a pause or a reset. A paused board sends a «Paused» text every 
 sends only data, the command of the request was lost.
 """
 FLOWING_S: Final = 0.1
-"""Limit, in s, of the interval between two reads that counts in full for ``PAUSE_RETRY_S``.
+"""Longest time, in s, that one interval between two reads can add to the time for
+``PAUSE_RETRY_S``.
 
-Of a longer interval, only ``FLOWING_S`` is counted. A running board sends every 10 ms.
+A running board sends every 10 ms. A longer interval does not show that the board has sent data all
+the time. So only ``FLOWING_S`` of it is counted.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.
 
-A paused board sends a «Paused» text every second. If a text arrives within this time after a
-command, the board may have sent the text before it received the command. So the text does not show
-whether the board obeyed the command. If data arrive within this time after a text, the board may
-have begun to run meanwhile. So this text does not show that the board is paused.
+A paused board sends a «Paused» text every second. There are two cases in which a text proves
+nothing:
+
+- The text arrives within this time after a command. The board may have sent the text before it
+  received the command. So the text does not show whether the board obeyed.
+- Data arrive within this time after the text. The board may have begun to run after it sent the
+  text. So the text does not show that the board is paused now.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -90,7 +95,9 @@ class ModeManager:
         self._mode_known = False
         """Whether the board's mode was known when the last reset was sent.
 
-        If it was not known, a notice of a paused board does not show that the board has restarted.
+        If a board that was not paused reports a pause after the reset, it has restarted. If its
+        mode was unknown, the board may have been paused before the reset, so its report does not
+        show a restart.
         """
         self._shown_at = math.inf
         self._request: Request | None = None
@@ -169,10 +176,9 @@ class ModeManager:
             self._reset(now)
 
     def give_up_start(self) -> bool:
-        """If the board refuses a start, fail the open ~/start request, and return True.
+        """Fail the open ~/start request if the board refuses the start. Return whether it failed.
 
-        The wanted mode is then again the one before the request. Without such a request or refusal,
-        return False.
+        If it failed, the wanted mode is again the one before the request.
         """
         refusal = self._board.start_refusal
         if self._request is not Request.START or self._board.mode.running or not refusal:
@@ -221,7 +227,7 @@ class ModeManager:
     def at_rest(self) -> bool:
         """Whether data from a running board need not be processed here.
 
-        This is so in the phase SETTLED, if no request is open and the board is not to be paused.
+        This is so in the phase SETTLED, if no request is open and the wanted mode is not PAUSED.
         """
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
@@ -251,10 +257,10 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Do what is due at ``now``, which is at most one of three things.
+        """Do at most one of three things, if it is due at ``now``.
 
-        Report a pause as confirmed, end a request as failed because its time is over, or send a
-        start again.
+        These are: report a pause as confirmed, end a request as failed because its time is over,
+        and send a start again.
         """
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")

@@ -119,7 +119,7 @@ class Judge:
                 self.driving = False
 
     def writes(self, last: Items, frames: int) -> None:
-        """Record several undamaged writes that are of the same kind as the write before them.
+        """Record several writes that arrive undamaged and do not change what the board does.
 
         ``last``: the newest of these writes. ``frames``: the number of their control frames.
         """

@@ -85,7 +85,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """A motion frame that has lost its last byte is in effect for less than 1.5 ms.
+    """A motion frame loses its last byte. The board obeys a wrong frame for less than 1.5 ms.
 
     The first byte of the next write completes the frame. This byte is a zero, so the frame is
     wrong. The board obeys the wrong frame only until it receives the frame of that next write.
@@ -207,10 +207,10 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """The function ``over`` adds the scores of one scene, or of all scenes with a stop.
+    """The function ``over`` adds the scores of one scene, or of all scenes that end with a stop.
 
-    Without a scene's name, it adds the scores of all scenes in which the robot must stop. With the
-    name of a scene, it adds only the scores of this scene, even if the robot need not stop in it.
+    With the name of a scene, it adds the scores of this scene, even if the robot need not stop in
+    it. Without a name, it adds the scores of all scenes in which the robot must stop.
     """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),

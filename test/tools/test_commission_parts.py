@@ -262,7 +262,7 @@ def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
 
 
 def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
-    """Return a drift with the same speed in both halves of its time span."""
+    """Return a drift with this mean velocity. Both halves of its time span have the same speed."""
     return Drift(vx, vy, yaw_rate, math.hypot(vx, vy), math.hypot(vx, vy))
 
 

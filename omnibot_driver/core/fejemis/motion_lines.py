@@ -19,10 +19,10 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Lowest commanded speed, in m/s, at which the front board's line for a curve has a speed above 0.
+"""Lowest commanded speed, in m/s, for which the front board's line of a curve contains a speed.
 
-If the commanded speed is lower, the speed in the line is 0, because only few smaller numbers can be
-sent safely.
+For a lower commanded speed, the line contains the speed 0. The reason: only few numbers below this
+limit can be sent safely.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
@@ -33,11 +33,11 @@ ANGLE_COST: Final = 1e4
 For comparison: a line whose speed is wrong by a factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to the linear speed in the drive board's line.
+"""Divisor that gives the smallest linear speed in the drive board's line, apart from 0.
 
-So the linear speed is at least the outer wheel's speed divided by this number. In forward motion,
-the linear speed can also be 0. In backward motion, it is never 0, because its sign gives the
-direction.
+This speed is the outer wheel's speed divided by ``SLOWEST``. In forward motion, the line can also
+contain the linear speed 0. In backward motion, it cannot, because the sign of the linear speed
+gives the direction.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.

@@ -16,15 +16,17 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of a difference that one displacement corrects.
+"""Fraction by which one displacement corrects the difference between a pose and the wheels' motion.
 
-The difference is between a pose and the motion that the wheel speeds give. The driver uses this
-small fraction only if rounding of the pose can explain the difference.
+The driver uses this small fraction only if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
-"""Largest difference between a pose and the wheels' motion that rounding of the poses can explain.
-The unit is one unit of the poses' last digit. A displacement depends on two poses, and each of them
-can be wrong by half a unit. In addition, the robot's rotation mixes the errors along both axes."""
+"""Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
+in units of the poses' last digit.
+
+A displacement depends on two poses, and each of them can be wrong by half a unit. So the error
+along one axis is at most one unit. The errors along both axes add up, so the limit is higher.
+"""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
 """``SLACK_M``, ``SLACK_RAD``: limits for the deviation of a pose from the wheels' motion, in m and
@@ -69,7 +71,8 @@ class PoseOdometry:
         """
         self._doubted: BoardPose | None = None
         self._agreed = 0
-        """How many rejected poses in a row agree with the rejected pose just before them."""
+        """How often in a row a rejected pose has agreed with the pose before it, which was
+        rejected, too."""
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
@@ -94,10 +97,12 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement from the previous pose to ``pose``, in a list.
 
-        The list is empty if there is no displacement (see the method ``pose``). The list also
-        contains a PoseReading every 0.2 s, after a restart of the board, and at the beginning of a
-        new coordinate frame. The PoseReading is the sum of all displacements. The sum includes a
-        displacement even if the driver rejects it later.
+        The list is empty if there is no displacement (see the method ``pose``).
+
+        The list also contains a PoseReading every 0.2 s, after a restart of the board, and at the
+        beginning of a new coordinate frame. The PoseReading is the sum of all displacements that
+        were returned. If the driver rejects one of these displacements in a later check, the sum
+        still contains it.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

@@ -43,11 +43,12 @@ RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
-This time is long enough for stopped wheels to come to rest, and for four tick reports to arrive.
-After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. A repetition
-restarts this time if the counts do not change and a reset would set them to zero. After the last
-repetition, the driver gives the reset up before this time has passed. So the driver never accepts
-such counts.
+In this time, stopped wheels come to rest, and four tick reports arrive.
+
+After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. But it must not
+accept small counts that stay the same although a reset would set them to zero, because they show
+that the board has not obeyed. So with such counts, each repetition restarts ``UNPROVED_S``. After
+the last repetition, the driver gives the reset up before ``UNPROVED_S`` has passed.
 """
 STEADY_S: Final = 0.3
 """Time in s. If the tick counts do not change for this time, the wheels are regarded as at rest.

@@ -17,11 +17,11 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports after which a board can be recognised as one that works as in the manual.
+"""Before this number of tick reports, no board is recognised as one that works as in the manual.
 
-The board is recognised when an odometry report with its own command byte (0x20) arrives. A board
-that has sent an odometry report with the command byte of a tick report (0x12) is never recognised
-as such.
+Afterwards, an odometry report with its own command byte (0x20) shows that the board is one. The
+report shows nothing if the board has already sent an odometry report with the command byte of a
+tick report (0x12).
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
@@ -69,8 +69,9 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        The detection needs a wheel that is commanded backward and that rolls backward according to
-        the board's odometry. If no count decreases then, the board counts only forward.
+        The board's odometry shows that a wheel rolls backward, and backward motion is commanded. If
+        the wheels roll backward for ``UNCOUNTED_M`` in this way, and no count has ever decreased,
+        the board counts only forward.
 
         ``told``: changes in the board's odometry since the previous odometry report; None if
         unknown.

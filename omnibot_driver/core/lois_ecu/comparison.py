@@ -46,18 +46,19 @@ ALONG_VARIANCE: Final = 0.15
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
 """Limit, in ticks, of the difference between a reported and an expected count. Above this limit,
-the wheel has changed its speed without a new set-point."""
+the wheel does not keep its speed, so the filter allows for larger changes of the speed."""
 UNFORESEEN: Final = 5.0
-"""Limit, in standard deviations, of the difference between a reported and an expected count. A
-larger difference cannot be a motion of the wheel: the counter may have restarted."""
+"""Limit, in standard deviations, of the same difference, to detect a restart of the board. No
+motion of the wheel explains a larger difference. If the counts are near zero too, the board has
+restarted."""
 SAME_TICKS: Final = 0.6
 """An unchanged count corrects the filter only if the expected count differs from it by at least
 this number of ticks. With a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): limits of the difference
-between the reported and the expected heading. If both are exceeded, the report is ignored: the
-board has computed the heading from an outdated wheel speed."""
+between the reported and the expected heading. If both are exceeded, the report is ignored, because
+the board has computed the heading from an outdated wheel speed."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
@@ -68,21 +69,21 @@ SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's x, and of its y, after a wheel has rolled 1 m at an
 oscillating speed. The error of the wheel's own distance (``SWINGING_M``) is separate."""
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviations of the error in a wheel's distance that lost reports cause, as a fraction of
-the distance that the wheel rolls while reports are lost. First value: at a steady speed. Second
-value: at an oscillating speed. Only a wheel without counted ticks has this error."""
+"""Lost reports cause an error in a wheel's distance. These are its standard deviations, as
+fractions of the distance that the wheel rolls while reports are lost. First value: at a steady
+speed. Second value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Error that remains in a distance after the board's odometry (0x20) has corrected it: standard
-deviation, as a fraction of the part of the correction above ``CORRECTED_TICKS``. The filter is
-linear, but the motion of a starting wheel is not, so large corrections leave an error."""
+"""Error that remains in a wheel's distance after a correction of more than ``CORRECTED_TICKS`` by
+the board's odometry (0x20): standard deviation, as a fraction of the excess over
+``CORRECTED_TICKS``. The reason: the filter is linear, but the motion of a starting wheel is not."""
 LATE_PART: Final = 0.6
 """Error in a wheel's distance that a late report causes: standard deviation, as a fraction of the
 distance that the wheel rolls during the delay. Only a wheel without counted ticks has this error.
 """
 EQUAL_RPM: Final = 3.0
-"""Standard deviation, in RPM, of the difference between the true speeds of the two wheels if the
-board's odometry shows that they are equal."""
+"""Standard deviation, in RPM, of the measurement that both wheels have the same speed. The filter
+uses this measurement when the board's odometry shows equal speeds."""
 
 
 class Comparison:
@@ -234,7 +235,10 @@ class Comparison:
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:
-        """Correct the motion filter: both wheels have the same speed, but it is not reported."""
+        """Correct the motion filter: both wheels have the same speed.
+
+        The board does not report the value of this speed.
+        """
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
         if sure and not any(speed.resting.chance for speed in self._speeds):
@@ -245,7 +249,7 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the wheel speeds in the filter towards zero: the board odometry is unchanged.
+        """Correct the filter's wheel speeds towards zero: the board's odometry shows no tick.
 
         ``ticks``: standard deviation of a wheel's distance since the last report, in ticks. A wheel
         whose speed the firmware does not measure is not corrected.

@@ -109,10 +109,10 @@ class SettingsWriter:
 
     @property
     def _waits(self) -> bool:
-        """Whether the driver must wait until the robot stops before it writes settings.
+        """Whether the driver must wait until the robot stops before it writes more settings.
 
-        The reason: writing a gain resets the controller of a wheel. The driver writes the first
-        ``ROUNDS`` rounds even while the robot drives.
+        It must wait if the robot drives, and ``ROUNDS`` rounds have already been written. More
+        rounds would disturb the drive, because a written gain resets the controller of a wheel.
         """
         return self._points.driving and self._rounds >= ROUNDS
 

@@ -2,8 +2,8 @@
 
 """Plausibility of a complete report: its values, and their change since the last report.
 
-Two successive reports may fit each other, but not the report before them. This shows that the board
-has restarted or was reset.
+If two successive reports fit each other, but not the report before them, the board has restarted or
+was reset.
 
 This module works on values and arrival times.
 """
@@ -32,8 +32,9 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time. The rate can be below 1,
 because the clock of the public firmware stops while the board sends."""
 SURE_AFTER: Final = 2
-"""Number of pairs of tick reports that must confirm the unit of the board's clock after a first
-pair has shown it. Only then is the unit regarded as known."""
+"""Number of pairs of tick reports that must confirm the unit of the board's clock. A first pair
+shows the unit, and this number of further pairs must show the same one. Before that, the unit is
+not regarded as known."""
 LEARNT_FROM_S: Final = 0.15
 """Shortest time in s between two tick reports from which the unit of the board's clock is inferred.
 Over a shorter time, the errors of the arrival times are too large."""

@@ -52,13 +52,14 @@ In a disturbed network, a reply may answer an earlier query instead of the last 
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Urgent queries. The driver sends them even if a late reply to an earlier query may still come.
 
-The driver could then mistake the late reply for the reply to the urgent query.
+The late reply could then be mistaken for the reply to the urgent query. Therefore, the driver marks
+the answer to the urgent query as doubtful.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
-"""Kinds of commands of which a copy of the reply can be mistaken for the reply to another query.
+"""Kinds of commands whose replies are easily confused, because most of them are only a number.
 
-Most of these replies are only a number.
+The network may deliver a copy of such a reply. The copy can be mistaken for the reply to a query.
 """
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
@@ -147,9 +148,10 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def answered(self, word: Word, reply: Ok, now: float) -> None:
-        """Record that ``reply``, which ``hear`` has not received, is the answer to ``word``.
+        """Record that ``reply`` is the answer to ``word``.
 
-        The driver can then recognise a later copy of this reply.
+        The caller has found this answer without the method ``hear``. The driver can now recognise a
+        later copy of the reply.
         """
         self._answers[word] = reply, now + self.delay_s
 
@@ -278,8 +280,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        There are three conditions. ``word`` is a query. An equal reply to another query or to a
-        move has just come. The last reply to ``word`` was different.
+        It is, if three conditions are true: ``word`` is a query, an equal reply to another query or
+        to a move has just come, and the last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

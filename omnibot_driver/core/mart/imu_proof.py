@@ -27,8 +27,8 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, the driver assumes that half of the additional time passed after the IMU
-was checked. So the result is older by this time.
+If a check takes longer, the network has delayed its command, its reply, or both. The driver assumes
+that the reply had half of the delay. The result is older by this half when it arrives.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
@@ -42,7 +42,7 @@ class ImuProof:
 
     ``dead``: whether the last checks found no working IMU.
 
-    ``transit_s``: time in s by which the last successful check exceeded its usual duration.
+    ``transit_s``: how much longer than usual the last successful check took, in s.
     """
 
     def __init__(self) -> None:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A straight line, learned by the driver, that gives a motor's speed for its motor units.
+"""A motor's speed as a function of its motor units: a straight line that the driver learns.
 
-A command sets the motor units, 0 to 127. Speeds are in nominal units: an ideal motor has speed 10
-at 10 motor units. This module knows units; it does not know wheels or time.
+A command sets the motor units, 0 to 127. The speed is in nominal units: at 10 motor units, an ideal
+motor has the speed 10. This module knows units; it does not know wheels or time.
 """
 
 import math
@@ -23,8 +23,8 @@ SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 The offset is in nominal units.
 """
 SURE: Final = 3.0
-"""Number of standard deviations. If a motor's expected speed is more than this number of its
-standard deviations, the motor certainly turns."""
+"""A motor certainly turns if its expected speed is above zero by more than this number of standard
+deviations."""
 NOISE, NOISE_PART = 0.3, 0.02
 """Standard deviation of a measured speed, in nominal units.
 
@@ -44,7 +44,7 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Improve the line by ``speed``, which was measured while the motor had ``units``.
+        """Correct the line by a measurement: the motor had ``speed`` at ``units``.
 
         ``speed``: in nominal units.
 
@@ -73,10 +73,11 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Record that the motor does not turn with ``units``, and lower the offset if necessary.
+        """Record that the motor does not turn with ``units``.
 
-        After this, the offset is as uncertain as at the beginning, because an obstacle may be the
-        true cause.
+        If the line gives a positive speed for these units, lower its offset, so that the speed
+        becomes zero. But perhaps an obstacle holds the wheel. So the offset is then as uncertain as
+        it was before the line learned anything.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2
@@ -84,8 +85,8 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add ``slope`` and ``offset`` to the slope and the offset of the line.
 
-        This method is called if only the other motor was measured. The lines of both motors then
-        change by the same amounts.
+        The caller uses this method if it has no measurement of this motor alone. The line then
+        changes by the same amounts as the line of the other motor.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
@@ -113,9 +114,12 @@ class MotorLine:
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
 
     def speed(self, units: float) -> float:
-        """Return the speed at ``units``, in nominal units; negative if the motor does not turn."""
+        """Return the speed at ``units``, in nominal units.
+
+        A negative speed means that the motor does not turn.
+        """
         return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:
-        """Return the command units for ``speed``, which is positive and in nominal units."""
+        """Return the motor units for ``speed``, which is positive and in nominal units."""
         return (speed - self.offset) / self.slope

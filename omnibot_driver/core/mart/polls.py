@@ -56,8 +56,9 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The most urgent query is the one with the smallest sum of due time and period. With this
-        order, every query is sent even if exchanges are slow.
+        The most urgent query is the one with the smallest sum of due time and period. The sum of a
+        query grows each time the query is sent. So each query that waits is the most urgent one at
+        some time, even if exchanges are slow.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]

@@ -153,9 +153,11 @@ the dead IMU. Before the answer, some servers turn the robot for 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
-"""Commands whose duplicate does harm if it arrives after another motion has begun. So before the
-next start, the driver waits until no duplicate of such a command can arrive. After the wait, it
-checks the IMU if the start needs this check."""
+"""Commands that do harm if a duplicate of them arrives after another motion has begun.
+
+So before the next start, the driver waits until no duplicate of such a command can arrive. If the
+start needs a check of the IMU, the driver checks the IMU after this wait.
+"""
 
 WHILE: Final[Mapping[Motion, State]] = {
     Motion.NONE: State.STILL,

@@ -37,11 +37,11 @@ FROZEN_S, FROZEN_TIMES = 0.5, 3
 """Limits for a heading that stays constant. The driver stops the robot when both limits are
 reached, because the IMU may be dead, or the robot stuck.
 
-``FROZEN_S``: time in s for which the heading is constant. The average duration of two exchanges is
-added to this limit.
+``FROZEN_S``: limit, in s, of the time for which the heading is constant. The driver adds twice the
+average duration of a query to it.
 
-``FROZEN_TIMES``: number of replies with the same heading. On a slow network, a smaller number of
-replies may have the same heading by chance.
+``FROZEN_TIMES``: limit of the number of replies with the same heading. On a slow network, only few
+replies come within the time limit, and few replies may have the same heading by chance.
 """
 NO_START_S: Final = 1.5
 """Longest allowed time in s from the start of a motion until the robot moves."""
@@ -63,11 +63,11 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel may turn unseen. The left wheel has no encoder.
 
-``STUCK_S``: time until the driver notices that the right wheel is stuck. It applies to motions in
-which the server does not report the heading.
+``STUCK_S``: the right wheel is stuck, and the server does not report the heading in this motion.
+The left wheel may turn for this time before the driver notices.
 
-``COASTS_S``: time for which the left wheel may still coast after a stop, when the right wheel is
-already at rest. At that time, the server has already ended the measurement of the motion.
+``COASTS_S``: the driver stops the robot because a wheel is blocked. When the right wheel is at
+rest, the server ends the measurement of the motion. The left wheel may still coast for this time.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -153,9 +153,9 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command. There is one exception: the command is kept if the driver already
-        refuses the motion in progress.
+        ``why``: the fault, for a notice to the user; empty without a fault. After a fault, the
+        user's command is discarded, too. If the driver already refuses the motion in progress, the
+        command is kept.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """
@@ -290,14 +290,13 @@ class Stops(Ground, ABC):
         )
 
     def _outlives(self, reply: Reply, now: float) -> None:
-        """Evaluate a reply that came after the driver has used the stop port.
+        """Detect a stop port that still waits for the end of the motion that it should stop.
 
-        If the reply answers a stop command, the server's stop port is not free: it still waits for
-        the end of the motion. It could then hang the next forward drive (RM); see
-        docs/boards/mart.md.
+        The driver has used the stop port. If the server answers a stop command after that, its stop
+        port still waits. It could then hang the next forward drive (RM); see docs/boards/mart.md.
 
-        A reply with a number does not show that the stop port waits. Such a reply answers an
-        earlier query, or the stop command of a turn on the spot, which leaves the stop port free.
+        A reply with a number does not show this. It answers an earlier query, or the stop command
+        of a turn on the spot. A turn on the spot leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

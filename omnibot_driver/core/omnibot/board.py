@@ -127,8 +127,8 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """The place in the stream of IMU frames at which the last read ended; None if unknown.
 
-        The bytes that are not decoded yet show this place: they may be the beginning of an IMU
-        frame.
+        The driver computes the place from the bytes that are received but not decoded yet. These
+        bytes may be the beginning of an IMU frame. In this case, the read ended within this frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -216,7 +216,7 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Do nothing after a stall: the board drives only wheels, which the driver stops anyway."""
+        """Do nothing after a stall: the driver stops the wheels anyway, and nothing else moves."""
 
     def due(self, now: float) -> Packets:
         """Return no packets, because the board sends without polling."""

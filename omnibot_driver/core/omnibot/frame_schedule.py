@@ -22,9 +22,9 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: the position in the sequence after a frame of ``kind`` has arrived at the
-    position ``at``. If the sequence has another kind at ``at``, all positions up to the next
-    ``kind`` are skipped.
+    ``after[kind][at]``: the new position in the sequence when the position is ``at`` and a frame of
+    ``kind`` arrives. The frame belongs to the next place with this kind, at ``at`` or later. The
+    new position is the one after this place.
     """
 
     def __init__(self, *kinds: Kind) -> None:

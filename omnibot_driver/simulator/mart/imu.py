@@ -12,9 +12,10 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    alive: whether the IMU is plugged in. The caller can set it. The settings can also plan a
-    failure.
-    closed: whether the server has stopped using the IMU. A successful RST IMU or SB ends this.
+    alive: whether the IMU is plugged in. The caller can set it. In addition, the settings can plan
+    a time in which the IMU does not work.
+    closed: whether the server has stopped using the IMU. The server uses it again after a
+    successful RST IMU or SB.
     rate_dps: turn rate of the last sample in degrees/s, minus the bias that the server knows.
     heading_deg: the relative heading in degrees, positive to the left.
     """

@@ -88,8 +88,8 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 def motor_in_loop(gains: Gains) -> Turned:
     """Return a function that gives the step response of a motor in the manual's control loop.
 
-    The function has three parameters, all of the motor: the PWM steps for a speed of one count per
-    tick, the time constant in s, and the delay in s.
+    The function has three parameters, which describe the motor: the effort in PWM steps for a speed
+    of one count per tick, the time constant in s, and the delay in s.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

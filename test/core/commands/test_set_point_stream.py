@@ -21,7 +21,8 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """A test motion whose first ``frames`` frames all differ; later frames repeat the last."""
+    """The first ``frames`` frames of this test motion all differ. Later frames equal the last of
+    them."""
 
     authority, is_zero = Authority.BASE, False
 

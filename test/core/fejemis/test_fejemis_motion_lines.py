@@ -57,9 +57,10 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The manual's example of a motion line loses two characters, and its checksum still fits.
+    """If the manual's example of a motion line loses two characters, its checksum can still fit.
 
-    The board would read another motion. The driver therefore chooses other digits.
+    The board then reads another motion. Therefore, the driver commands this motion with other
+    digits.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
@@ -70,7 +71,8 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
     """A line loses one or two characters. The board reads no wrong motion.
 
-    A second line follows the first one. If the line end is lost, the board reads both as one line.
+    The test also sends a second line, because the board reads both lines as one if the line end is
+    lost.
     """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
@@ -113,10 +115,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
     """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
 
-    If the line end and the next semicolon were lost, the board would read both as one line. With 92
-    as the checksum of the second line, this would be the motion ``rc 2 0 092``. The stop line's
-    checksum would not show the damage. Therefore, the driver sends an empty line before such a
-    second line.
+    The lost characters can be the line end and the semicolon at the beginning of the next line. The
+    board then reads both lines as one. If the checksum of the next line is 92, this one line begins
+    with the motion ``rc 2 0 092``, and its checksum does not show the damage. Therefore, the driver
+    sends an empty line before such a next line.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)

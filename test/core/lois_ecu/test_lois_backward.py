@@ -63,9 +63,9 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """The odometry detects that a wheel was at rest before the driver started it again.
 
-    The board keeps reporting 12 RPM for this wheel. The driver commands 7 RPM backward. A wheel
-    that rolled would now slow down from 12 RPM. This wheel does not, so the odometry adds no
-    distance.
+    The board keeps reporting 12 RPM for this wheel. Then the driver commands 7 RPM backward. A
+    rolling wheel would now slow down from 12 RPM. This wheel does not slow down, so it was at rest
+    before. The odometry adds no distance for the time before the start.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -85,12 +85,11 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 
 
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
-    """The driver does not assume that a resting wheel rolls because the board's heading is wrong.
+    """The driver does not take a wrong heading of the board for a sign that a resting wheel rolls.
 
-    In a turn, the wheel that turns backward stops, and the driver detects this. The board still
-    computes its heading from the old speed of this wheel, so the board's heading is far from the
-    true one. The driver does not take the difference of the headings for a sign that the wheel
-    rolls.
+    In a turn, the wheel that turns backward stops, and the driver detects this. But the board still
+    computes its heading from the old speed of this wheel. So the board's heading differs from the
+    driver's heading. The driver must not explain the difference by a rolling wheel.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)

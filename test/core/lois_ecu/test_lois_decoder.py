@@ -62,9 +62,9 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """A group of lines is plausible. The decoder returns it as soon as the last byte arrives.
+    """The decoder returns a plausible group of lines as soon as its last byte arrives.
 
-    Only the first group of each kind waits for the next line or for a silence.
+    The first group of each kind is an exception: it waits for the next line or for a silence.
     """
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
@@ -152,10 +152,9 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """If a line of two reports is lost, the report that is still complete is decoded.
+    """If a tick report, or the odometry report after it, loses a line, the other one is decoded.
 
-    The two reports are ticks, and odometry after them. The board sends both with the same command
-    byte.
+    The board sends both reports with the same command byte.
     """
     decoder = LoisDecoder()
     found: list[Report] = []
@@ -217,10 +216,12 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The decoder drops a report whose tick counts jump, and then accepts what continues from it.
+    """The decoder drops a report whose tick counts jump. The next report shows the reason of the
+    jump.
 
-    If the next report continues from the new counts, the board has restarted. The decoder then
-    returns this next report, but not the report with the jump.
+    If the next report continues from the counts before the jump, only the dropped report was wrong.
+    If it continues from the counts after the jump, the board has restarted. In both cases, the
+    decoder returns the next report.
     """
     decoder = LoisDecoder()
     said = [

@@ -2,9 +2,9 @@
 
 """Drives of a simulated LOIS robot with few or many encoder ticks per turn.
 
-If a wheel has more than about 1000 ticks per turn, the simulated board cannot measure the speed of
-the wheel. So the tests command duties to this board. The public firmware loses fast ticks, so the
-tests of this firmware have at most 60 ticks per turn.
+If a wheel has more than about 1000 ticks per turn, the simulated board cannot measure the wheel's
+speed, and so cannot control it. Tests with such wheels command duties instead of RPM. The public
+firmware loses fast ticks, so the tests of this firmware have at most 60 ticks per turn.
 """
 
 import math
@@ -77,8 +77,9 @@ def test_a_robot_with_such_encoders_drives_out_and_back(
 
 @pytest.mark.slow
 def test_a_new_resolution_applies_while_the_driver_runs() -> None:
-    """The encoders have 1000 ticks per turn, but 60 is set, so fast counts are rejected.
+    """The encoders have 1000 ticks per turn, but the parameter is set to 60.
 
+    With 60 ticks per turn, the counts of a fast wheel are implausible, so the driver rejects them.
     A notice names the parameter. The user sets 1000 during the connection. From then on, no report
     is rejected.
     """

@@ -67,8 +67,9 @@ def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
     """Between two drives, the user sets the server's clock back. The driver needs one more start.
 
-    Because of the change, the second drive (RM, forward) begins with a reported heading of about
-    1e15°. Therefore, the driver starts this drive once more. Then the robot moves as commanded.
+    After this change, the server begins the next drive (RM, forward) with a reported heading of
+    about 1e15°. The driver notices this, and starts the drive once more. Then the robot moves as
+    commanded.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

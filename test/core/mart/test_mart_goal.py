@@ -204,10 +204,10 @@ def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
 def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     firmware: Firmware, before: tuple[float, float], stops_s: float | None
 ) -> None:
-    """The command for the turn to a goal is lost. Then a late ok to an IMU check arrives.
+    """The command for the turn to a goal is lost. Then the late ok to an IMU check arrives.
 
-    This ok must not confirm the turn. The encoder still shows the count of the previous motion, and
-    the odometry does not add this count again.
+    The driver must not take this ok for the reply to the turn command. The encoder still shows the
+    count of the previous motion. The odometry does not add this count again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
@@ -281,12 +281,11 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
-    """The server executes a straight move, and then a copy of it that the network delivers late.
+    """The server executes a straight move. Then a late copy of the command begins a second run.
 
-    The driver stops the second run. Then the encoder shows only the distance of the second run. The
-    driver knows from earlier moves how far the first run went, and adds this distance. Then the
-    robot continues to the goal. The stopped run does not change the distances that the driver
-    requests for later moves.
+    The driver stops the second run. The encoder then shows only the distance of the second run. So
+    the driver adds the distance of the first run, which it knows from earlier moves. Then the robot
+    continues to the goal. The driver does not learn from the stopped run how far a move goes.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)

@@ -38,13 +38,13 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """A measurement above the line that the driver uses must not make the motor seem slower.
+    """If a motor is faster than the driver expects, the driver must not expect less afterwards.
 
-    The measured speed of a motor is right at 18 units, and too low at 26 units. A straight line
-    through both points would show motion at zero units, which is impossible. So the driver uses a
-    line without such a motion. At 14 units, the speed on this line is too low. Then the true speed
-    at 14 units is measured, which is above the line. This measurement must not lower the line at 14
-    units.
+    The driver measures the speed at 18 units, which is right, and at 26 units, which is too low.
+    The straight line through both points has a speed above zero at zero units, which is impossible.
+    So the driver uses another line, which does not have this error. On this line, the speed at 14
+    units is too low. Then the driver measures the true speed at 14 units. After this, the speed at
+    14 units on the line must not be lower than before.
     """
     line = MotorLine()
     for _ in range(8):
@@ -127,10 +127,11 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """If the units of a start do not move the robot, the next start uses three times as many.
+    """If a start does not move the robot, the next start uses three times as many motor units.
 
-    This increase ends at 20 units. If a start with 30 units does not move the robot, the next start
-    has at least 20, but fewer than 30 units.
+    Such an increase ends at 20 units. If a start with 30 units does not move the robot, the wheels
+    are regarded as blocked. This changes nothing: the next start still has at least 20, but fewer
+    than 30 units.
     """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4

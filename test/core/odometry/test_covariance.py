@@ -184,10 +184,10 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """Only a pose that ends a gap reduces the covariance. In this test, no pose ends a gap.
+    """A pose that does not end a gap leaves the covariance unchanged.
 
-    Other poses contain the same errors as the odometry, because the board also computes its pose
-    from the wheels.
+    It contains the same errors as the odometry, because the board also computes its pose from the
+    wheels.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -200,9 +200,10 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(max_examples=40, suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Apart from rounding, the velocity that is computed back from a frame is the commanded one.
+    """Apart from rounding, the driver computes the commanded velocity back from its frame.
 
-    Rounding changes a word by up to 0.5 LSB, and a word with a harmful byte by up to 1.5 LSB.
+    Rounding changes a word of the frame by up to 0.5 LSB. If the word would contain a harmful byte,
+    it changes by up to 1.5 LSB.
     """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)

@@ -30,8 +30,8 @@ NODE: Final = "omnibot_driver"
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
     """The services switch the LED on and off. The driver sends the ball command exactly once.
 
-    The board may miss the ball command, because it cannot receive while it sends. Nevertheless, the
-    driver does not send it again.
+    The board may miss this single ball command, because it cannot receive while it sends. The
+    driver does not repeat it, because the board could then drop two balls.
     """
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
@@ -49,7 +49,8 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 ) -> None:
     """The compass shows east, and the declination is 0.1 rad. The published heading is -0.1 rad.
 
-    The heading is in the ENU frame, in which east is 0. GPS position and time are published, too.
+    The heading is in the ENU frame, in which east is 0 and left is positive. Magnetic east is 0.1
+    rad to the right of true east. GPS position and time are published, too.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
