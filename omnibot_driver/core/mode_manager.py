@@ -2,9 +2,11 @@
 
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
-The letters S (start), P (pause) and R (reset) may be lost on the line, and a P resumes a paused
-board. So each request is an exchange with a deadline. This module does not know bytes, and reads no
-clock.
+The letters S (start), P (pause) and R (reset) may be lost on the line, so the driver may have to
+repeat them. But a P that is repeated without need resumes a paused board. So the board's data and
+texts decide when a letter is repeated, and each request has a deadline.
+
+This module does not know bytes, and reads no clock.
 """
 
 import math
@@ -299,8 +301,8 @@ class ModeManager:
         """Begin to pause the board.
 
         ``with_p``: whether the board may already have obeyed a P, or whether a P may still be on
-        its way. A second P would resume a paused board. So the driver waits for ``PAUSE_RETRY_S``
-        before the next P.
+        its way. If so, the driver waits for ``PAUSE_RETRY_S`` before the next P, because a second P
+        would resume a paused board.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

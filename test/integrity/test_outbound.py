@@ -110,7 +110,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """The judge reports stray motion if the board makes a command of a damaged Stop.
+    """The judge reports stray motion if the board takes a damaged Stop for a command.
 
     The Stop has lost one byte, and the first byte of the next Stop completes its frame. The board
     reads this frame as a wheel command of 255 LSB.

@@ -30,8 +30,8 @@ reset of a robot at rest. The reset is proved if a count was at least this large
 and both counts are zero afterwards. A smaller change may come from the backlash of the gears."""
 UNPROVED_S: Final = 2.5
 """Time in s for which the driver waits for a proof. After this time, it accepts counts near zero
-without a proof, because there may be none: if the counts were already near zero before the reset,
-no proof is possible."""
+without a proof. The reason: if the counts were already near zero before the reset, no proof is
+possible."""
 
 
 class ResetProof:

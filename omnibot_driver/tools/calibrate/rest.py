@@ -3,8 +3,10 @@
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
 A tilt of the sensor, a slope of the floor, and a bias at right angles to gravity have the same
-effect on the readings. Therefore only the bias along gravity is found. This module knows readings;
-it does not know how they are recorded.
+effect on the readings. The readings do not show which of them is the cause. Therefore, only the
+bias along gravity is found.
+
+This module knows readings; it does not know how they are recorded.
 """
 
 from collections.abc import Callable

@@ -21,8 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """The first ``frames`` frames of this test motion all differ. Later frames equal the last of
-    them."""
+    """The first ``frames`` frames of this test motion all differ. Then the last one repeats."""
 
     authority, is_zero = Authority.BASE, False
 

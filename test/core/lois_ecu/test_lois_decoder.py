@@ -216,8 +216,7 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The decoder drops a report whose tick counts jump. The next report shows the reason of the
-    jump.
+    """The decoder drops a report whose tick counts jump, and checks the next report.
 
     If the next report continues from the counts before the jump, only the dropped report was wrong.
     If it continues from the counts after the jump, the board has restarted. In both cases, the
