@@ -55,8 +55,8 @@ class Keeper:
         self._descriptors = descriptors
         self.last_words = stop, emergency_stop
         self._ahead = 0
-        """Number of bytes of stop commands that the guard may not have read yet. The other unread
-        bytes are heartbeats; too many of them show that the guard hangs."""
+        """Number of bytes of stop commands that the guard may not have read yet. All other unread
+        bytes are heartbeats. If too many heartbeats are unread, the guard hangs."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed processes that have not ended yet."""
@@ -96,10 +96,11 @@ class Keeper:
     def end(self, *, stopped: bool, written: bool = False) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        * ``stopped``: whether the robot is already stopped. If not, the guard first sends its stop
-          command.
-        * ``written``: whether the driver could write its last packets to the port. If not, old
-          motion commands may still wait in the kernel's output, so the guard discards this output.
+        * ``stopped``: whether the robot is already stopped. If it is False, the guard sends its
+          stop command before it ends.
+        * ``written``: whether the driver could write its last packets to the port. If both values
+          are False, the guard first discards the kernel's output, where old motion commands may
+          wait.
         """
         self._restart_at = math.inf
         if stopped:
@@ -142,7 +143,10 @@ class Keeper:
         self._process, self._broken = None, False
 
     def _addressed(self, packets: Packets) -> str:
-        """Return the packets as text for the guard, without packets for lines that are not open."""
+        """Return the packets as text for the guard, except packets for lines that are not open.
+
+        The text of a packet is the number of the line, and the bytes in hexadecimal.
+        """
         return ",".join(
             f"{line}:{data.hex()}"
             for channel, data in packets

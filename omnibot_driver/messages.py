@@ -273,9 +273,10 @@ def time_message(nanoseconds: int) -> Time:
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
     """Return wall clock minus steady clock, in ns.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. These times give
-    two limits of the result. ``known_ns`` is the previous result. It is returned again if it is
-    within the limits, so that the result changes rarely. Otherwise the nearer limit is returned.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. So the difference
+    is between ``wall_ns - after_ns`` and ``wall_ns - before_ns``. If the previous result
+    ``known_ns`` is within these limits, it is returned again. So the result changes rarely.
+    Otherwise the limit that is nearer to ``known_ns`` is returned.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

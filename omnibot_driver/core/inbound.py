@@ -54,9 +54,9 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        There is one exception: these bytes change the mode of the board. Then the result is empty.
-        ``hear`` adds the estimates to the reporter's events instead, and calls ``process`` itself.
-        So the change of mode takes effect before the driver handles the next command.
+        If the bytes change the mode of the board, ``hear`` also calls ``process`` itself. So the
+        change takes effect before the driver handles the next command. In this case, the estimates
+        are added to the reporter's events, and the result is empty.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -128,8 +128,8 @@ class Inbound:
 def _show_life(readings: Sequence[Reading]) -> bool:
     """Return whether readings that came without new bytes show that the board is alive.
 
-    OdometryReadings, NoticeReadings and results of requests do not show that, because they can
-    follow from elapsed time alone.
+    OdometryReadings, NoticeReadings and results of requests can follow from elapsed time alone, so
+    they are ignored. Any other reading shows that the board is alive.
     """
     for reading in readings:
         content = reading.content if isinstance(reading, ExtraReading) else reading

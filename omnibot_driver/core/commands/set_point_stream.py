@@ -105,12 +105,12 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        The set-point in effect is sent again at once. The reason depends on the packets. If they
-        are Stop, they have ended the motion. If they are not Stop, the board may hold a motion
-        frame whose last bytes were lost: the packets then complete this frame, and the board obeys
-        a wrong motion.
+        The set-point in effect is sent again at once, for one of two reasons. If the packets are
+        Stop, they have ended the motion. If they are not Stop, the board may hold the beginning of
+        a motion frame whose last bytes were lost. It then takes the first bytes of the packets for
+        the lost ones, and obeys a wrong motion.
 
-        After Stop, a zero set-point is not sent again.
+        There is one exception: after Stop, a zero set-point is not sent again.
         """
         if self._heard is not None:
             self._heard(packets, now)

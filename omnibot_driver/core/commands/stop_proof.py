@@ -51,10 +51,11 @@ class StopProof:
     """The proof that the robot stands still.
 
     * ``proved``: whether a standstill is proved. Two events prove it: the robot stood still for
-      ``still_s`` after Stop, or the board paused. A sent motion command or a measured motion sets
-      the value to False again.
-    * ``owed``: whether the proof is still missing for the last motion command that was sent.
-    * ``measured``: whether a measured displacement has arrived since Stop.
+      ``still_s`` after Stop, or the board paused. The value becomes False when a motion command is
+      sent, or when a measured displacement shows a motion.
+    * ``owed``: True from the last motion command that was sent until a standstill is proved.
+    * ``measured``: whether a measured displacement has arrived later than ``UNDER_WAY_S`` after
+      Stop.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

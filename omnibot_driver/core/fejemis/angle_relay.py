@@ -22,11 +22,11 @@ MOST_OWED: Final = 0.5
 """Largest rounding error, in degrees, that is carried over to the next angle."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit in degrees for a wrong angle.
+"""Limit in degrees for an angle that the board misreads.
 
-Damage on the line can remove the minus sign of an angle, and the checksum may not detect this. Then
-the board reads an angle to the right as an angle to the left. The driver chooses the text of each
-angle so that such a wrong angle is smaller than ``ACROSS``.
+Damage on the line can remove the minus sign of an angle, and the checksum may not detect this. The
+board then reads an angle to the right as an angle to the left. The driver writes each angle such
+that a misread angle is smaller than this limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -84,7 +84,7 @@ def _with_sum(tenths: int) -> bytes:
 
 
 def _written(tenths: int) -> list[str]:
-    """Return all possible texts for an angle. Some of them have zeros that could be left out.
+    """Return the possible texts for an angle, for example 5.3, 5.30, 05.3 and 05.30.
 
     ``tenths``: the angle in tenths of a degree.
     """

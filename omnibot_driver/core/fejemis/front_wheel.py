@@ -19,10 +19,10 @@ SICK_LINES: Final = 3
 """How many lines in a row must report a fault before the angle sensor is regarded as faulty."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Tolerance, in degrees, for the change between two angles.
+"""Tolerance, in degrees, for the change from the last accepted angle to a new one.
 
-A change is accepted if it is at most this tolerance plus the turn of the wheel at its highest speed
-(``FASTEST_DEGPS``).
+The driver adds the angle by which the wheel can turn in the time between the two, at its highest
+speed (``FASTEST_DEGPS``). If the change is at most this sum, the new angle is accepted.
 """
 BITS: Final = (
     (10, False, "broken Hall element"),
@@ -109,9 +109,9 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always accepted. A later angle is accepted if it is near the last
-        accepted angle. If the previous angle was rejected, an angle near this rejected angle is
-        accepted too.
+        The first angle is always accepted. A later angle is accepted in two cases. In the first
+        case, it is near the last accepted angle. In the second case, the previous angle was
+        rejected, and the new angle is near this rejected angle.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -28,12 +28,12 @@ PAIR_WITHIN_S: Final = 0.005
 """Limit, in s, for the time between the two lines of a pair. If this time is as long as the
 limit or longer, the pair may be false, so the pair must wait for the next pose."""
 SILENT_S: Final = 0.1
-"""Length in s of a time without gyro and acceleration lines. After a longer time without these
-lines, each new pair must wait for the next pose.
+"""Longest usual time, in s, without gyro and acceleration lines.
 
-The pair must wait even if its two lines come close together. From the next pose, the driver
-learns whether the board sent nothing, or whether the host only read late. If the board sent
-nothing, the sampling time of the pair is unknown, so the pair is rejected.
+After a longer time, it is unknown whether the board sent nothing, or whether the host only read
+late. The next pose shows this. Until then, each new pair must wait, even if its two lines come
+close together. If the board sent nothing, the sampling time of the pair is unknown, so the pair is
+rejected.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver. During this time, every new pair must wait for the next
@@ -44,31 +44,31 @@ SUREST_S: Final = 0.05
 """Limits, in s, for the difference ``_evidence_s``, which shows which line of a sample comes first.
 
 The difference is the sum of the intervals before gyro lines, minus the sum of the intervals before
-acceleration lines. Each interval begins at the previous line of the other kind. The interval
-between two samples is longer than the interval within a sample. So a positive difference shows that
-the gyro line comes first. A negative difference shows that the acceleration line comes first.
+acceleration lines. Each interval begins at the previous line of the other kind. The line that comes
+first has the longer intervals before it, because the interval between two samples is longer than
+the interval within a sample. So if the difference is positive, the gyro line comes first. If it is
+negative, the acceleration line comes first.
 
 ``KNOWN_S``: the sign of the difference is used only if its magnitude is at least this value.
 
-``SUREST_S``: largest magnitude that is stored.
+``SUREST_S``: a larger magnitude is reduced to this value.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to some intervals between a gyro and an acceleration line. It is added
-if a line of another kind arrives in the interval, because such an interval is probably between
-two samples."""
+"""Time in s that is added to an interval between a gyro and an acceleration line if a line of
+another kind arrives in it. Such an interval is probably between two samples, and with this time it
+is longer than an interval within a sample."""
 PATIENCE: Final = 60
-"""Largest number of intervals that the driver measures before it decides which line of a sample
-comes first. Then it decides even if the magnitude of ``_evidence_s`` is still below ``KNOWN_S``.
-The magnitude stays that small if the two lines are half a period apart."""
+"""Number of intervals after which the driver decides which line of a sample comes first, even if
+the magnitude of ``_evidence_s`` is still below ``KNOWN_S``. The magnitude stays small if the two
+lines are half a period apart: all intervals are then equally long."""
 MOST: Final = 10
 """Largest magnitude of a counter in ``_outside``. Each kind of line has such a counter, except
 gyro and acceleration lines. A positive counter shows that lines of this kind usually come
 between two pairs. A negative counter shows that they usually come between the two lines of a
 pair."""
 UNPOSED: Final = 20
-"""Limit for the number of gyro lines since the last pose, and for the number of acceleration
-lines. If one of these numbers is above the limit, a pair that still waits for the next pose is
-rejected."""
+"""Limit for the number of gyro lines, and of acceleration lines, since the last pose. If one of the
+two numbers exceeds it, the driver no longer waits for the next pose: it rejects the pair."""
 
 
 @dataclass(slots=True)
@@ -117,7 +117,7 @@ class ImuPairs:
         unknown."""
         self._evidence_s = 0.0
         """The sum of the intervals before gyro lines, minus the sum of the intervals before
-        acceleration lines, in s. If it is positive, the gyro line of a sample comes first."""
+        acceleration lines, in s. ``SUREST_S`` explains how it shows which line comes first."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -128,9 +128,9 @@ class ImuPairs:
         pairs increase the counter, and lines within a pair decrease it."""
         self._skipped = 0
         self._silent = False
-        """Whether more than ``SILENT_S`` has passed between one gyro or acceleration line and
-        the next. While this flag is True, new pairs are doubtful. The next pose resets the flag,
-        and so does the rejection of a pair."""
+        """Whether there was a silence: a time of more than ``SILENT_S`` between two successive gyro
+        or acceleration lines. After a silence, new pairs are doubtful. This ends with the next
+        pose, or when ``take`` rejects a pair because no pose comes."""
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -171,9 +171,9 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all pairs that still wait.
 
-        The time since the previous pose shows how many gyro and acceleration lines the board has
-        sent. If both gyro and acceleration lines are missing, each of the waiting pairs may be
-        false. So all of them are rejected. Waiting pairs are also rejected at the first pose, and
+        The time since the previous pose shows how many lines of each kind the board has sent. If
+        both gyro and acceleration lines are missing, any of the waiting pairs may be false, so all
+        of them are rejected. They are also rejected if this time is unknown: at the first pose, and
         at a pose whose time is before the time of the previous pose.
         """
         self.other("pose")

@@ -21,7 +21,7 @@ from omnibot_driver.core.readings import PausedReading
 AngleTold = Callable[[float, float], bool]
 """A function that receives the front wheel's angle in rad and the time in s.
 
-It returns whether this shows a new fault: the wheel does not turn to its commanded angle.
+It returns True if the angle shows a new fault: the wheel does not turn to its commanded angle.
 """
 
 
@@ -58,9 +58,9 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return the front wheel's new angle in rad, and forget it. The driver must relay it.
+        """Return the new angle of the front wheel in rad, which must be sent to the drive board.
 
-        The drive board needs this angle. None if no angle has arrived since the last call.
+        A second call returns None until another angle has arrived.
         """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad

@@ -29,8 +29,8 @@ MOST_PERCENT: Final = 100
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
 """Number of times that RPM 0/0 is sent after a Stop. One time would be enough, but lines may be
-lost. If the robot drives again, RPM 0/0 is sent directly before each of the first set-points.
-While the robot stays stopped, RPM 0/0 is sent alone."""
+lost. While the robot stays stopped, RPM 0/0 is sent alone. If the robot drives again before this
+number is reached, RPM 0/0 is sent directly before each set-point until it is reached."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

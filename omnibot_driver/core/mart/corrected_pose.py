@@ -23,12 +23,13 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Standard deviations of the first run of a controlled move that runs twice.
+"""Standard deviations of the first run of a controlled move that the robot makes twice.
 
-If the network delivers the request twice, the robot makes the move twice. The first run is not
-measured: its distance or turn is only estimated.
-``RUN``: an error that grows with the estimate, as a fraction of the estimate.
-``END_RUN_M``, ``END_RUN_RAD``: additional constant errors, of a distance in m and of a turn in rad.
+The robot makes a move twice if the network delivers the request twice. Only the second run is
+measured. The distance or turn of the first run is estimated, and these values describe the error of
+the estimate.
+``RUN``: the part of the error that grows with the estimate, as a fraction of the estimate.
+``END_RUN_M``, ``END_RUN_RAD``: the constant part of the error, in m and in rad.
 """
 
 
@@ -81,8 +82,8 @@ class CorrectedPose:
     def run_before(self, is_straight: bool, amount: float) -> None:
         """Add the first run of a controlled move to the pose, if the robot has made the move twice.
 
-        A duplicate of the request for the move has started the second run. Only the second run was
-        measured.
+        A duplicate of the request has started a second run, and only this run was measured. The
+        first run is regarded as complete.
 
         ``amount``: the expected distance of a complete run in m, or its expected turn in rad.
         """
@@ -96,7 +97,7 @@ class CorrectedPose:
             self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def lose_turn(self) -> None:
-        """Add the error of a turn of unknown size.
+        """Increase the uncertainty, because the robot may have turned by an unknown angle.
 
         For example, the server restarts in a motion. During the restart, the motors keep their last
         command, so the robot may turn. After it, the server's relative heading begins at zero, so
@@ -105,7 +106,7 @@ class CorrectedPose:
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
     def doubt_turn(self, turn_rad: float) -> None:
-        """Add the error of a turn from which an angle ``turn_rad`` may be missing.
+        """Increase the uncertainty: an angle ``turn_rad`` may be missing in a measured turn.
 
         One of the wheels may have stood still. The robot has then turned about this wheel, so that
         its centre has moved too.
@@ -114,12 +115,12 @@ class CorrectedPose:
         self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)
 
     def _end_turn(self, *, may_be_recorded: bool) -> float:
-        """End a turn on the spot, and return the correction of its angle in rad.
+        """End a turn on the spot: correct the heading, and return the correction in rad.
 
-        If the angle from the server is plausible, the correction is zero. Otherwise the angle from
-        the encoder count replaces it. An implausible angle has one of two reasons: it belongs to
-        another motion, or only one of the wheels has turned. The method cannot know which one, so
-        the whole difference between the two angles is added to the uncertainty.
+        If the server has reported a plausible angle, or none, the correction is zero. An
+        implausible angle has one of two reasons: it belongs to another motion, or only one of the
+        wheels has turned. The driver cannot know which one. So it uses the angle from the encoder
+        count instead, and adds the difference between the two angles to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

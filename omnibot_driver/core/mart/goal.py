@@ -21,21 +21,21 @@ SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
 """Motor units of controlled moves at normal speed, which are sent without the word SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""Number of moves after which a larger distance from the goal is accepted, and this larger distance
-in m.
+"""From ``ENOUGH_MOVES`` moves on, a distance of ``ENOUGH_M`` (in m) from the goal is accepted.
 
-The robot could only come nearer with another turn and another straight move.
+Before, the distance must be smaller (``NEAR_M``). To come nearer than ``ENOUGH_M``, the robot would
+need another turn and another straight move.
 """
 STRETCH: Final = 1.3
-"""Ratio of driven to requested length of a straight move. The driver assumes this ratio until it
-has measured such a move for the first time.
+"""Assumed ratio of driven to requested length of a straight move, until such a move was measured.
 
-For example, 12 requested inches become 15.8 driven inches.
+For example, the robot drives 15.8 inches if 12 inches are requested, a ratio of 1.32.
 """
 DOCK_STRETCH: Final = 1.6
-"""Largest assumed ratio of driven to requested length of a docking move.
+"""Assumed largest ratio of driven to requested length of a docking move.
 
-A request for 19 inches (0.48 m) becomes a move of 0.73 m.
+The driver requests the allowed length divided by this ratio, so the robot does not drive too far.
+For example, a request for 19 inches (0.48 m) leads to a move of 0.73 m, a ratio of 1.5.
 """
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
@@ -43,8 +43,9 @@ WORTH_DEG: Final = 1.0
 WIDER: Final = 0.5
 """Factor by which the allowed heading error increases with each turn since the last straight move.
 
-After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. Turns go too far, so
-without this increase the robot could turn back and forth.
+After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. A turn may go too
+far, and the turn back may go too far again. The increase prevents that the robot turns back and
+forth.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
@@ -67,7 +68,7 @@ class Surplus:
         self._learned: set[bool] = set()
 
     def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
-        """Learn from a finished move how much farther than requested the robot moves.
+        """Learn from a finished move how much farther it went than requested.
 
         ``way_m``, ``turned_rad``: the measured distance and turn. Their signs do not matter.
         """

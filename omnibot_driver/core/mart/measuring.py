@@ -27,7 +27,7 @@ ROLLS_S, ROLLS_AFTER_MOVE_S, ROLLS_LONG_S = 0.3, 0.6, 1.2
 ``ROLLS_AFTER_MOVE_S``: after a controlled move. The server replies to a failed move at once, while
 the robot still coasts.
 
-``ROLLS_LONG_S``: after a reply which says that the wheels still turned.
+``ROLLS_LONG_S``: after a reply that reports wheels in motion.
 """
 
 
@@ -113,7 +113,7 @@ class Measuring(Starts):
             self._learn(reading, now)
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
-        """Stop a robot whose encoder counts change although it should be at rest.
+        """Stop the robot if its encoder counts change although it should be at rest.
 
         Possible causes: a late duplicate of a start, another client, or a push.
         """

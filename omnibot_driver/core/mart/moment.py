@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Limit in s. A reply is regarded as uncertain if the time of its value is uncertain by this much
-or more."""
+"""Limit in s for ``Moment.spread_s``. From this value on, the time of the value in a reply is
+regarded as uncertain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,5 +36,5 @@ class Moment:
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether the time of the value is uncertain, or the reply may answer another query."""
+        """Whether the time of the value is uncertain, or the reply may answer an earlier query."""
         return self.doubtful or self.spread_s >= UNCERTAIN_S

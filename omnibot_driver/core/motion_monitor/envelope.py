@@ -22,9 +22,11 @@ The ratio is above 1, because controllers overshoot, and users measure the board
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed speeds outside the hull, in m/s and rad/s.
+"""``NOISE_MPS``, ``NOISE_RADPS``: speeds outside the hull, in m/s and rad/s, that are always
+allowed.
 
-The causes are encoder resolution, rounding, and a slope if the wheel controllers are slow.
+The encoders' resolution and rounding can cause such speeds. So can a slope, if the wheel
+controllers are slow.
 """
 SIDEWAYS: Final = 0.1
 """Deviation from the set-points that is allowed in any direction.
@@ -61,7 +63,8 @@ _DIRECTIONS: Final = tuple(
 )
 """Directions in which the distance to the hull is computed.
 
-There are few directions, so the computed distance can be up to 2 % too small.
+The direction of the true distance can be between two of them. Then the computed distance is too
+small, by at most 2 %.
 """
 
 
@@ -99,9 +102,10 @@ def outside(
 
 
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
-    """Return whether the motion is near a set-point or between two successive set-points.
+    """Return whether the motion is near a set-point, or on the way from one set-point to the next.
 
-    Such motion is inside the envelope. This quick check precedes the exact one, ``outside``.
+    Such motion is inside the envelope. The caller makes this quick check before the exact one,
+    ``outside``.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]

@@ -19,8 +19,8 @@ BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
 with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
 
-If displacements were lost, the driver adds their possible motion to both limits. It does so
-until an accepted pose includes this motion.
+After a loss of displacements, both limits are larger: the driver adds the motion that the lost
+displacements may contain. The next accepted pose shows this motion, and ends the addition.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -33,14 +33,14 @@ class PoseGate:
     """Decides which poses of the board are accepted.
 
     * ``proved``: the last accepted pose; None if there is none that is still valid.
-    * ``doubted``: the last unexpected pose, which the next pose must confirm. Each later motion of
-      the robot is added to it. None if there is no such pose.
+    * ``doubted``: the last unexpected pose, moved on by each later motion of the robot. The next
+      pose must confirm it. None if there is no such pose.
     """
 
     def __init__(self) -> None:
         self.refused = 0
-        """Number of rejected poses. A pose is rejected if it is impossible. It is also rejected
-        if it is unexpected and the next pose does not confirm it."""
+        """Number of rejected poses. They are of two kinds: poses that are impossible, and
+        unexpected poses that the next pose has not confirmed."""
         self.proved: Pose | None = None
         self.doubted: Pose | None = None
         self._unproved_s = 0.0
@@ -51,9 +51,9 @@ class PoseGate:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Add the motion during a gap to the unconfirmed pose ``doubted``.
+        """Move the unconfirmed pose ``doubted`` on by the robot's motion during a gap.
 
-        ``chord``: the motion that the driver assumes for the gap, in the axes of ``doubted``.
+        ``chord``: the assumed motion during the gap, in the axes of ``doubted``.
         """
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)
@@ -63,7 +63,7 @@ class PoseGate:
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
-        """Return whether a pose is finite and below the limits. If not, count it as refused."""
+        """Return whether a pose is finite and below the limits. If not, count it as rejected."""
         possible = told.finite and told.way_m < FARTHEST_M and abs(told.yaw_rad) < FARTHEST_RAD
         self.refused += not possible
         return possible
@@ -91,7 +91,8 @@ class PoseGate:
 
         The result is False if no pose was accepted yet.
 
-        ``seconds``: time in s that is added to the time recorded with ``passed``.
+        ``seconds``: time in s in which the robot may have moved, in addition to the time recorded
+        with ``passed``.
 
         ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.
         """
@@ -110,7 +111,8 @@ def expected(way: Pose, gap: Covariance) -> bool:
 
     ``way``: the difference between this pose and the expected pose.
 
-    ``gap``: covariance of the motion that the lost displacements since the last pose may contain.
+    ``gap``: covariance of the motion in the displacements that were lost since the last accepted
+    pose.
     """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS

@@ -15,8 +15,8 @@ TICK_S: Final = 0.01
 """Period of the board's control loop in s; the board sends one IMU frame in each period."""
 POSE_PERIOD_S: Final = 0.2
 DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
-"""Possible periods of the deltas in s. Each is a multiple of a tick, and the period of the poses
-is a multiple of it."""
+"""Possible periods of the deltas in s. Each is a whole number of ticks, and divides the period of
+the poses."""
 DELTAS_MISSING: Final = 6
 """If this number of deltas in a row does not arrive, the board is assumed to be in IMU-only
 mode."""

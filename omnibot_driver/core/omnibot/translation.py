@@ -38,20 +38,21 @@ MOST_TEXTS_LOST: Final = 9
 """Largest number of "Paused" texts that can have been lost since the last received one.
 
 The counter in the texts shows how many were lost. The board sends one text a second, and answers a
-reset within 9 s. So if the counter seems to show a larger number, the board has restarted.
+reset within 9 s. So while the driver waits for this answer, at most 9 texts can be lost. If the
+counter changes by more, the board has restarted, and its counter has begun again.
 """
 FULL: Final = 4000
 """Number of bytes in a read from which on the kernel's buffer of 4 KiB counts as full.
 
-Only the bytes that are decoded after the read are counted. The decoder may keep some bytes of a
-read for later, so the number is below 4096.
+The decoder may keep some bytes of a read for later, and only the other bytes are counted. So the
+number is below 4096.
 """
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The check compares two times: the time that the board needed to send the bytes of the next read, and
-the time between the two reads. The next read is late if the first time is longer than ``BURST_S``
-plus twice the second time.
+The next read is late if it has more bytes than the board can send in the time between the two
+reads. To allow for errors, sending the bytes must take longer than twice this time plus
+``BURST_S``.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
@@ -88,11 +89,11 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """``_most_singles``: first value of ``singles_to_come``. The fast path counts
-        ``singles_to_come`` down when it decodes a frame; ``_most_singles`` does not change."""
+        """For each frame that it decodes, the fast path subtracts 1 from ``singles_to_come``.
+        ``_most_singles`` is the value before the first subtraction."""
         self.heard_s = -math.inf
         self._behind_s = 0.0
-        """Time in s from the sending of the last byte to the read that returned it."""
+        """Delay of the last read in s: the time from the sending of its last byte to the read."""
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Return the readings of the frames that were completed by one read at the time ``now``.
@@ -124,9 +125,9 @@ class Translation:
         If the read was not late, the result is ``now``.
 
         While the driver was late, the kernel's buffer may have become full. A full buffer keeps its
-        bytes, and loses all bytes that arrive later. So no byte is missing between the bytes in the
-        buffer: the board sent the bytes of this read directly after those of the previous read. The
-        same is true if the driver needs several reads to empty the buffer.
+        bytes, and loses all bytes that arrive later. So no byte is missing within the buffer, even
+        if the driver needs several reads to empty it: the board sent the bytes of this read
+        directly after those of the previous read. Their number shows how long the sending took.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S

@@ -78,10 +78,11 @@ class DeviceClock:
         self._seen_tick: int | None = None
         self._settled = False
         self._calm: ClockFit | None = None
-        """The fitted clock; None if the fast path must not be used.
+        """The fitted clock if the fast path may be used; None if not.
 
-        The fast path is used only if the last read ended with a complete sample, and its arrival
-        was near to the time that the fitted clock predicts.
+        The fast path may be used after a read that ended with a complete sample, and arrived near
+        the time that the fitted clock predicts. It is not used until ``BEAT_READS`` reads have
+        arrived.
         """
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
@@ -89,17 +90,17 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s of the last read that brought a new tick.
 
-        If the next read with a new tick follows within half a period, both ticks had waited to be
-        read.
+        The board's ticks are a period apart. So if the next read with a new tick follows within
+        half a period, the ticks had waited to be read.
         """
         self._awaited: Point | None = None
-        """Number of the next tick, and the earliest time in s at which its sample can be
-        complete."""
+        """Number of the next tick, and the earliest time in s at which the last byte of its sample
+        can arrive."""
         self._cut_off: Point | None = None
-        """The tick whose sample was incomplete in the last read: its number, and the earliest time
-        in s at which its sample can be complete.
+        """The tick that had an incomplete sample in the last read: its number, and the earliest
+        time in s at which the sample can be complete.
 
-        The time is valid only if the rest of the sample arrives. The value is None if the last read
+        The time is used only if the rest of the sample arrives. The value is None if the last read
         ended with a complete sample.
         """
 
@@ -170,7 +171,7 @@ class DeviceClock:
     def _due(
         self, tick: int, now: float, edge: SampleBoundary | None, readings: int
     ) -> float | None:
-        """Return the stamp in s of one new tick if it came complete and on time, else None."""
+        """Return the stamp in s of a new tick; None if its sample is incomplete or not on time."""
         line = self._calm
         if line is None or edge is None or edge.ahead or edge.cut or tick == self._seen_tick:
             return None
@@ -188,8 +189,8 @@ class DeviceClock:
     def _count(self, readings: Sequence[Reading]) -> list[int]:
         """Return the tick number of each reading.
 
-        Lost readings increase it too. If the board's own counter in a displacement shows that
-        another number of ticks has passed, the tick number is corrected.
+        Lost readings are counted, too. The board's own counter in a displacement also gives the
+        number of ticks that have passed. If it differs, the tick number is corrected.
         """
         ticks: list[int] = []
         for reading in readings:
@@ -204,7 +205,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return how many ticks are missing in the tick number, by the displacement's counter."""
+        """Return the correction of the tick number, in ticks, by the counter in a displacement."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -217,8 +218,8 @@ class DeviceClock:
         Return the correction in ticks. It is positive if the count was too low because of lost
         ticks.
 
-        ``counted``: whether this read contains a displacement. If so, or if all recent arrivals
-        were late, the tick number of the last displacement is corrected too.
+        ``counted``: whether this read contains a displacement. The tick number of the last
+        displacement is corrected too if ``counted`` is True, or if all recent arrivals were late.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -265,8 +266,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record the delay ``lag_s`` of a new tick, which was read at ``now``.
 
-        ``lag_s``: arrival of the tick minus its time by the fitted clock, in s. If several ticks
-        were read within half a period, only the ``lag_s`` of the last tick is stored.
+        ``lag_s``: arrival of the tick minus its time by the fitted clock, in s. If the previous
+        tick was read less than half a period before, this delay replaces that of the previous tick.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -281,13 +282,11 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set a tick's stamp by the fitted clock, but limit the step from the last stamp.
 
-        The smallest step is half a period, or ``room_s`` if that is shorter, but it is never below
-        ``SMALLEST_STEP_S``.
-
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: time in s that is left for this step. It is limited: no stamp may be later than
-        the arrival, and the other stamps of this read need time, too.
+        ``room_s``: this step's share of the time in s from the last stamp to the read. The stamps
+        of a read share this time, because none may be later than the read. The smallest step is
+        half a period or ``room_s``, whichever is shorter, but at least ``SMALLEST_STEP_S``.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

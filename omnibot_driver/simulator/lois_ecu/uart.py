@@ -18,8 +18,8 @@ INPUT_DEPTH = 600
 class Uart:
     """The serial port.
 
-    ``loses``: whether it keeps only the first byte that arrives while interrupts are off.
-    input: characters that were received but not read yet.
+    ``loses``: whether bytes are lost while interrupts are off. Only the first of them is then kept.
+    ``input``: characters that were received but not read yet.
     """
 
     def __init__(self, *, loses: bool) -> None:
@@ -58,7 +58,7 @@ class Uart:
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
-        """Make the next ``listen`` lose a character, as an interrupt of 0.2 ms would do."""
+        """Simulate an interrupt of 0.2 ms: the next ``listen`` loses a character."""
         self._misses = True
 
     def listen(self) -> int:
@@ -86,8 +86,8 @@ class Uart:
     def send(self, sent: bytearray) -> bool:
         """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
-        Return True if a time with interrupts off has ended in this step. The caller must then call
-        ``hear_kept``.
+        Return True if data that is sent with interrupts off ends in this step. Interrupts are then
+        on again, and the caller must call ``hear_kept``.
         """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, MOST_CREDIT)
         while self._sending and self._out_credit >= 1.0:

@@ -21,7 +21,7 @@ CONTROLLED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_SPIN
 
 
 def obey(server: "MartServer", text: str) -> None:
-    """Execute a command of the stop port: SL or SS (stops), or SDR (limits a move)."""
+    """Execute SL (stops a drive), SS (stops a spin) or SDR (limits a move)."""
     quirks = server.quirks
     if text == "SL":
         _stop_first(server, DRIVES)
@@ -33,12 +33,11 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", motion: Motion) -> bool:
-    """Stop an uncontrolled motion (F, B, RM, R, L).
+    """Stop an uncontrolled motion (F, B, RM, R, L), if it is not already stopping.
 
     Return whether the caller must wait for the end of the motion.
 
-    This function does not change a motion that is already stopping. It does not stop a drive (F, B,
-    RM) that the server does not supervise.
+    There is one exception: a drive (F, B, RM) that the server does not supervise is not stopped.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

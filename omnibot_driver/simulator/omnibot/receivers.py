@@ -74,7 +74,8 @@ def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
 def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
-    The bytes of an accepted frame can also belong to the next frame, so frames can overlap.
+    The receiver keeps the bytes of an accepted frame. The next frame may begin with some of them,
+    so frames can overlap.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -138,8 +139,7 @@ class CommandReceiver:
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
         """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        If ``control_frames`` is false, the receiver looks only for state letters, and for no
-        frames.
+        If ``control_frames`` is false, the receiver finds only state letters.
         """
         if self.to_swallow:
             self.to_swallow -= 1

@@ -53,8 +53,8 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Force and torque are converted to one effort for each wheel. The conversion is the same as from
-    a velocity to wheel speeds. The effort of each wheel is added to its motor's effort.
+    Force and torque are converted to one effort for each wheel, by the equations that convert a
+    velocity to wheel speeds. Each effort is added to the effort of the wheel's motor.
     """
 
     x_pwm: float = 0.0

@@ -171,7 +171,7 @@ class Model:
         self._force, self._rate, self._heard_s = force_mps2, rate_radps, now_s
 
     def odom(self, pose: Pose, twist: BodyTwist | None, now_s: float) -> None:
-        """Store a message of ``odom``; ``twist`` is None if the driver did not measure it."""
+        """Store the values of an ``odom`` message; ``twist`` is None if it was not measured."""
         self._odom.arrived(now_s)
         self._follow(pose, now_s)
         self._pose, self._pose_s, self._measured, self._heard_s = pose, now_s, twist, now_s
