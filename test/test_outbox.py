@@ -26,7 +26,7 @@ def in_threads(*works: Callable[[], object]) -> None:
 
 
 class Held:
-    """A thread that delivers an event until ``let_go`` is called."""
+    """Keeps the outbox busy: a thread delivers an event, which lasts until ``let_go`` is called."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._begun, self._over = threading.Event(), threading.Event()
@@ -90,7 +90,7 @@ def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed:
 
 
 def test_nobody_claims_what_is_not_next() -> None:
-    """A thread gets the right to deliver only if no other thread delivers and no event waits."""
+    """``claim`` gives the right to deliver only if no other thread delivers and no event waits."""
     outbox = Outbox()
     held = Held(outbox)
     assert not outbox.claim()
@@ -171,7 +171,7 @@ def test_a_call_that_is_put_just_before_the_end_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """The outbox is full, so a thread that calls ``deliver`` waits for the thread that delivers.
+    """The outbox is full, and a thread delivers. A second call of ``deliver`` waits for it.
 
     Without this wait, the outbox could grow without limit.
     """

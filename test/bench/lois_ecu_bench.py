@@ -89,7 +89,7 @@ class Stage:
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     """Return the comparisons of the driver with the floor, and an empty list.
 
-    The list is for further sections of the report.
+    The caller expects a list of further sections for the report. The LOIS ECU has none.
     """
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:

@@ -63,7 +63,7 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 @pytest.mark.slow
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """All commands are accepted, even if odometry arrives rarely.
+    """Odometry arrives rarely. Nevertheless, all commands are accepted.
 
     The user sends fifty commands at 20 Hz.
     """
@@ -182,7 +182,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """The driver stops a robot that was disconnected while it drove, and is connected again.
+    """A robot is disconnected while it drives. When it is connected again, the driver stops it.
 
     For 5 s, nothing arrives in either direction. The robot may have driven all the time.
     """
@@ -200,9 +200,9 @@ def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_agai
 ) -> None:
     """The driver still repeats Stop when a line that was cut carries data to the robot again.
 
-    The line is cut in both directions while the robot drives. After 4 s, the robot receives again,
-    but the driver still receives nothing. Without a proof of a stop, the driver repeats Stop for 5
-    s. So the robot receives a Stop.
+    The line is cut in both directions while the robot drives. The driver gets no proof of a stop,
+    so it repeats Stop for 5 s. After 4 s, the robot receives again, but the driver still receives
+    nothing. So the robot receives one of the last Stops.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False
@@ -214,7 +214,7 @@ def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_agai
 
 @pytest.mark.slow
 def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
-    """A command with NaN is refused, and the command before it stays active."""
+    """A command with NaN is rejected, and the command before it stays active."""
     bench.drive_on()
     with pytest.raises(CommandRefused, match="NaN or infinity"):
         bench.session.command_twist(BodyTwist(math.nan, 0.0, 0.0), bench.now)
@@ -254,9 +254,9 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 @pytest.mark.slow
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench) -> None:
-    """The odometry stays finite and plausible although the line is cut at random moments.
+    """The line is cut at random moments, while the robot drives, reverses or rests.
 
-    The robot drives, reverses and rests meanwhile.
+    The odometry stays finite and plausible.
     """
     random = Random(1)
     for vx in (0.3, -0.2, 0.0, -0.2):

@@ -98,10 +98,10 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Motion before a reset of the odometry does not appear in odom after the reset.
+    """Frames are lost. Then the odometry is reset, before the board's next pose arrives.
 
-    Frames are lost. Then the odometry is reset, before the board's next pose arrives. This pose
-    shows the motion of the lost frames, which happened before the reset.
+    This pose shows the motion of the lost frames. The motion happened before the reset, so it does
+    not appear in odom.
     """
     for seed in range(4):
         on = line(seed)

@@ -62,7 +62,7 @@ class Ending:
 
     ``full``: whether the driver's port is full of old commands. The robot may then drive longer.
 
-    ``read``: whether the driver does not end before it reads data again. The robot may then drive
+    ``read``: whether the driver ends only when it reads data again. The robot may then drive
     longer.
     """
 
@@ -132,7 +132,7 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """Send SIGINT when the cable is plugged in again, but the driver has not opened the port yet.
+    """Plug in the cable again, and send SIGINT before the driver has opened the port.
 
     The robot still carries out its last command. The driver must stop the robot, and then end.
     """

@@ -205,8 +205,8 @@ def another_client(said: bytes, rig: Rig) -> None:
 def imu_dies(rig: Rig) -> None:
     """Let the IMU fail while the robot drives by the command RM, which starts both motors.
 
-    The robot must stop. After this stop, the controller's server hangs. So this function restarts
-    the server at the end.
+    The robot must stop. The controller's server hangs after this stop, so this function finally
+    restarts it.
     """
     rig.drive()
     rig.wait_ticks(100)

@@ -27,9 +27,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Least number of trials for each kind of receiver and each rate of lost bytes.
 
-This number of trials is divided among all scenes that end a drive. There is one exception: with 1
-byte in 100 lost, each of the three scenes in ``HURRIES`` has at least this number of trials for
-itself.
+All scenes that end a drive share this number. There is one exception: with 1 byte in 100 lost, each
+of the three scenes in ``HURRIES`` has at least this number of trials, not only a share.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"

@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board reports a moving robot in two cases: while the driver sends motion commands, and while the
-set-point that the board has received is a motion. A change of the board's state appears in its
-reports after one or two ticks.
+The board reports a moving robot in two cases: the driver sends motion commands, or the set-point
+that the board has received is a motion. A change of the board's state appears in its reports after
+one or two ticks.
 """
 
 import math
@@ -37,8 +37,9 @@ Memo = dict[tuple[bytes, bool, bytes], Made]
 
 A key has three items: the bytes that the receiver held before, whether the line was idle at that
 time, and the new bytes. A value has two items: the bytes that the receiver holds afterwards, and
-the frames that it has found. Each frame comes with the position of its last byte. If the receiver
-has found a letter (S, P or R) in the bytes, the value is ``None``.
+the frames that it has found. Each frame comes with the position of its last byte. The value is
+``None`` if the receiver has found a letter (S, P or R): the new bytes must then be processed one by
+one.
 """
 
 
@@ -137,9 +138,9 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip the next writes that arrive undamaged and change nothing, except the last of them.
+        """Skip all but the last of the next writes that arrive undamaged and change nothing.
 
-        The skipped writes count as arrived.
+        The skipped writes count as arrived. The last one goes over the line as usual.
         """
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1

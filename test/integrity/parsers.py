@@ -36,7 +36,8 @@ def driver() -> tuple[Feed, Feed]:
 def plain() -> tuple[Feed, Feed]:
     """Make a parser that has no checks. Return the functions that feed and flush it.
 
-    The parser knows the kind and the length of a frame only from the two bytes of its header.
+    The two bytes of a header give the kind and the length of a frame. The parser checks nothing
+    else.
     """
     held = bytearray()
 

@@ -89,7 +89,7 @@ def python_files(*paths: str) -> list[Path]:
 
 
 def statements(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Yield every statement of a module, but not the expressions in it."""
+    """Yield every statement of a module, including the statements within other statements."""
     waiting: list[Any] = [*tree.body]
     while waiting:
         node = waiting.pop()

@@ -56,7 +56,8 @@ WITHIN_A_WORD = re.compile(r"(?<=\w)")
 CONJUNCTIONS = {"And", "But", "Nor", "Or"}
 """Words that must not begin a docstring.
 
-Such a docstring could not be understood without the function's name.
+A docstring that begins with such a word only continues the function's name, and cannot be
+understood alone.
 """
 
 
@@ -78,7 +79,7 @@ def texts() -> dict[str, str]:
 
 @cache
 def found() -> dict[str, list[str]]:
-    """Return, for each phrase that is used, its places: file, line and the words there."""
+    """Return the places of each phrase that occurs: the file, the line and the words."""
     places: dict[str, list[str]] = {}
     lowered = {name: text.lower() for name, text in texts().items() if name not in ALLOWED}
     for phrase, one in PATTERNS.items():

@@ -137,7 +137,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """The log is empty. Its columns have zero rows, so that calculations need no special case."""
+    """A log without entries has columns with zero rows, so calculations need no special case."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -260,7 +260,7 @@ def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixt
 
 @pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a wheel controller")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
-    """A board lacks something, so the tool refuses a calibration that needs it, in one sentence.
+    """A calibration needs something that a board lacks. The tool refuses it in one sentence.
 
     The OmniBot lacks nothing, so the tool refuses none of the calibrations.
     """

@@ -78,7 +78,8 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
     """Ms is the largest sensitivity of the control loop, over all frequencies.
 
-    The sensitivity at any frequency, computed from the impulse response, is at most Ms.
+    The test computes the sensitivity at a random frequency from the impulse response. It is at most
+    Ms.
     """
     ticks = 4000
     pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks), prepend=0.0)
@@ -158,8 +159,8 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """The proposed gains keep the limits of Ms and overshoot.
 
     Compared with the manual's gains, they reduce the error after a load change. The error after a
-    command may become larger. For each of the two errors, the test divides the new error by the old
-    one. The sum of both ratios is less than 2.
+    command may become larger, but not by as much. For each of the two errors, the test divides the
+    new error by the old one, and the sum of both ratios is less than 2.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

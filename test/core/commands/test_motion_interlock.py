@@ -28,7 +28,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
     """The motion monitor stops the robot, and a sender continues to send motion commands.
 
-    All of them are refused, because the pause between them is shorter than the command timeout.
+    All of them are refused, because the sender never pauses for as long as the command timeout.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -38,9 +38,9 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """A silence of the length of the command timeout ends the refusal of motion.
+    """The motion monitor has stopped the robot. A pause of the commands ends the refusal of motion.
 
-    The motion monitor has stopped the robot. The timeout is counted from the last command, not from
+    The pause must be as long as the command timeout. It is counted from the last command, not from
     the stop.
     """
     interlock = MotionInterlock()

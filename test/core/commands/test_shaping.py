@@ -56,7 +56,7 @@ def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: float) -> None:
-    """The driver refuses a command with infinity or NaN. The previous command expires as usual."""
+    """The driver rejects a command with infinity or NaN. The previous command expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match="NaN or infinity"):
@@ -69,7 +69,7 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """A wheel command with a wrong number of rates is refused. The error gives this number."""
+    """A wheel command with a wrong number of rates is rejected. The error gives this number."""
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)

@@ -44,9 +44,9 @@ class Driver(NamedTuple):
     ``counted``: whether the driver has read the encoder since the last stop. The driver reads the
     encoder only when late commands can do no harm any more.
 
-    ``greeted``: whether a stop of the driver was confirmed at least once.
+    ``greeted``: whether the server has confirmed a stop at least once.
 
-    ``underway``: whether the driver believes that the motors may be under direct control (MCS).
+    ``underway``: whether the motors may be under direct control (MCS), as far as the driver knows.
     """
 
     state: State = State.UNKNOWN
@@ -75,8 +75,8 @@ class World(NamedTuple):
 
 
 Rules = Callable[[State, str, Motion], bool]
-"""A function that tells whether a command is allowed in a state and motion. It has the content of
-the driver's table of commands."""
+"""A function that returns whether the driver's table of commands allows a command. Its arguments
+are the state of the driver, the command, and the motion of the robot."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
 """A function that returns all commands that the table of commands allows. Its arguments are the
 state of the driver, and the motion of the robot."""
@@ -87,7 +87,7 @@ def ready(world: World, word: str) -> bool:
     """Return whether the modelled driver is ready to send ``word``.
 
     The table of commands must allow ``word``. Before some commands, the driver must also have
-    waited for late copies and checked the IMU. The real driver does the same.
+    waited for late copies and checked the IMU. These are the rules of the real driver.
     """
     driver = world.driver
     row = BY_TEXT[word]
@@ -153,10 +153,10 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 
 
 def _ends(world: World) -> Iterator[Step]:
-    """Yield the ways in which a controlled move ends.
+    """Yield the steps in which a controlled move ends.
 
-    During the move, a late copy of a move may have arrived at the server. The server may execute
-    this copy after the move.
+    If a late copy of a move has arrived during the move, there are two possible steps: the server
+    forgets the copy, or it executes the copy after the move.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -205,9 +205,9 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether the driver must find out which motion is in progress before it does more.
+    """Return whether the driver must first find out which motion is in progress.
 
-    This is so if three conditions hold: the driver does not know the motion, it has used the stop
+    It must if three conditions hold: the driver does not know the motion, it has used the stop
     port, and none of its stops was ever confirmed.
     """
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
@@ -217,8 +217,8 @@ def sweeps_first(driver: Driver) -> bool:
 def _asked(world: World) -> Step:
     """Return the step in which the driver finds out which motion is in progress.
 
-    The driver does this after a stop on the stop port. On a real network, the reply can be lost.
-    The model has no step for this case, because such a step would not change the world.
+    The driver does this after a stop on the stop port. The model has no step for a lost reply,
+    because a lost reply would not change the world.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -234,7 +234,7 @@ def _asked(world: World) -> Step:
 
 
 def _said(word: str, world: World) -> Iterator[Step]:
-    """Yield the steps that may follow when the driver sends this command."""
+    """Yield the possible steps when the driver sends this command: it is lost, late or executed."""
     driver = world.driver
     row = BY_TEXT[word]
     if row in STARTS:
@@ -289,9 +289,9 @@ def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
 
     ``late``: whether the reply is late, so that it may belong to an earlier command.
 
-    A late reply is never taken for the answer to a check, a controlled move or MSM. A check and a
-    move take longer than the longest delay of a reply. So late replies to earlier commands arrive
-    before the answer to the check or move can come.
+    A late reply is never taken for the answer to a check, a controlled move or MSM. The server
+    needs more time for a check or a move than a reply can be late. So when the answer to a check or
+    a move comes, all late replies to earlier commands have arrived.
     """
     driver = world.driver
     state = driver.state

@@ -119,10 +119,10 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """If a stop cancels the download of the log, the result says that the server has ended.
+    """A stop cancels the download of the log. The result says that the server has ended.
 
-    The driver has already sent EXIT, which ends the server. Then a zero command cancels the
-    download. Now the driver cannot get the file, so the result asks the user to copy it from the
+    The download begins with EXIT, which ends the server. Then a zero command cancels the download.
+    The driver can no longer get the file, so the result asks the user to copy it from the
     controller.
     """
     bench = MartBench().ready()
@@ -141,8 +141,8 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
     """The log can be downloaded after a straight drive.
 
-    After such a drive, the heading is often exactly zero. It is also zero after a restart, which
-    would lose the log. The driver does not take the zero for a sign of a restart.
+    A server that was restarted has lost its log, and its heading is exactly zero. After a straight
+    drive, the heading is often exactly zero, too. The driver does not mistake this for a restart.
     """
     for seed in range(3):
         bench = MartBench(firmware, seed=seed).ready()

@@ -112,8 +112,8 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
     """Something, such as a door sill, slows a turn for about a second. Then the turn is free again.
 
-    From then on, the robot may turn too fast, but its rate stays below 0.9 rad/s if 0.5 rad/s is
-    commanded. If the driver has learned from an earlier turn, it stays below 0.6 rad/s.
+    From then on, the robot may turn faster than the commanded 0.5 rad/s, but slower than 0.9 rad/s.
+    If the driver has learned from an earlier turn, the robot stays below 0.6 rad/s.
     """
     bench = MartBench("source").ready()
     if learned:
@@ -156,7 +156,7 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Slow turns on the spot are up to 17 % faster than commanded: motor units are whole numbers.
+    """Motor units are whole numbers, so slow turns on the spot are up to 17 % too fast.
 
     These turns do not change the balance of the motors that the driver has learned from a drive.
     """
@@ -255,9 +255,9 @@ def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
 
 
 def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> None:
-    """The motors differ by 18 %, and /diagnostics shows it.
+    """The motors differ by 18 %, and /diagnostics shows this measured value.
 
-    The driver itself assumes at most 8 %.
+    It shows the value although the driver itself assumes a difference of at most 8 %.
     """
     bench = MartBench("source", motor_inequality=0.18).ready()
     bench.command(0.3, 0.0, 6.0)

@@ -27,8 +27,8 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 ) -> None:
     """A wheel gets stuck during a turn to a goal. The server measures the turn only by the gyro.
 
-    The encoder of the right wheel shows another angle than the gyro. So the driver discards the
-    goal. The covariance covers the difference between the two angles.
+    The encoder of the right wheel shows another angle, so the driver discards the goal. The
+    covariance of the pose covers the difference between the two angles.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 0.0, 2.6)
@@ -45,10 +45,10 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 
 @pytest.mark.parametrize("first_s", [0.0, 2.0])
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
-    """The left wheel is stuck in a turn, so the right wheel shows twice the angle of the robot.
+    """The left wheel is stuck in a turn, so the right wheel turns twice as far for the same angle.
 
-    The server's reply to the stop contains the true angle. The driver reports the difference
-    between the two angles, and the covariance covers it.
+    The server's reply to the stop contains the true angle. The driver computes another angle from
+    the right wheel. It reports the difference between the two angles, and the covariance covers it.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)
@@ -88,10 +88,10 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
 def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
     vx: float, first_s: float
 ) -> None:
-    """The right wheel gets stuck in a drive. The left wheel then turns the robot.
+    """The right wheel gets stuck in a drive, so the left wheel turns the robot.
 
-    The turn continues until the driver notices that a wheel is stuck. The driver does not measure
-    the whole turn. The covariance covers the error of the pose.
+    This turn ends when the driver notices that a wheel is stuck. The driver cannot measure the
+    whole turn, so the covariance must cover the error of the pose.
     """
     bench = MartBench("source").ready()
     bench.command(vx, 0.0, first_s)

@@ -56,7 +56,8 @@ def trembling(random: Random) -> list[float]:
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
     """Return ``count`` noisy readings of an IMU at rest, with 1 g upward.
 
-    ``leaps``: jumps to add, by the number of the reading, and then by the number of the word in it.
+    ``leaps``: jumps to add. The outer keys are numbers of readings, and the inner keys are numbers
+    of words in a reading.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
@@ -79,8 +80,8 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 ) -> None:
     """A high bit of one word of a reading is changed, so the word jumps for a single reading.
 
-    This reading is rejected, and the next one is released at once. The sensor's ranges are 2 g and
-    250 °/s.
+    This reading is rejected, and the next one is released at once. The jumps have the sizes of high
+    bits of a sensor with ranges of 2 g and 250 °/s.
     """
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
@@ -105,9 +106,9 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """Some values of one reading belong to another frame: the force along z and the gyro's values.
+    """In one reading, the force along z and the gyro's values belong to another frame.
 
-    The filter rejects this reading.
+    A robot cannot change its turn rate for a single reading, so the filter rejects the reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
@@ -132,8 +133,8 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
     """A knock saturates the sensor, so the value of one reading is at the end of the scale, 2 g.
 
-    A single changed bit cannot turn a usual reading into this value. So the filter releases the
-    reading.
+    A single changed bit cannot turn a reading at rest into this value. So the filter does not
+    suspect damage, and releases the reading.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -144,8 +145,8 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
     """The value of a bit in m/s² depends on the scale of the sensor (``full_scale_mps2``).
 
-    A reading jumps by the value of a high bit at this scale. So the filter takes the jump for a
-    damaged bit, and rejects the reading.
+    A reading jumps by the value that a high bit has at this scale. The filter regards the bit as
+    damaged, and rejects the reading.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -237,9 +238,9 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """A rejected displacement reports a restart of the board, and has an unknown duration.
+    """A displacement is rejected. It reports a restart of the board, and has an unknown duration.
 
-    The filter passes both facts on with the next displacement.
+    The next displacement reports the restart instead, and its duration becomes unknown.
     """
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
@@ -320,10 +321,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor sends text, so damage cannot change a single bit of a value.
+    """A knock changes one reading of a sensor that sends text. The reading is released at once.
 
-    Its full scale is set to infinity for this reason. A knock that changes one reading is released
-    at once.
+    In a text, damage cannot change a single bit of a value. So the filter must not look for changed
+    bits: the full scale is set to infinity.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
@@ -362,8 +363,9 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
     """A board's own odometry corrects itself by a step that is too large for any robot.
 
-    A filter with ``corrected=True`` releases this step, marked with ``measured=False`` and
-    ``possible=False``. It rejects a step only if it contains NaN or infinity.
+    A filter with ``corrected=True`` releases this step, but marks it as neither measured nor
+    possible (``measured=False``, ``possible=False``). It rejects a step only if it contains NaN or
+    infinity.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

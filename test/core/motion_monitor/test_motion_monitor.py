@@ -203,10 +203,10 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """A commanded robot does not move. The monitor returns a fault each second.
+    """A robot does not obey a motion command. The monitor returns a fault each second.
 
-    The caller must filter out the repetitions. If the e-stop was released before, the monitor
-    returns a different fault, because the board may still hold its e-stop.
+    The caller must filter out the repetitions. After a release of the e-stop, the monitor returns a
+    different fault: the board may still be in its own emergency stop.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -218,10 +218,10 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot that was held may drive too fast, until it has made up for the lost distance.
+    """A robot that was held may then drive too fast, until it has made up for the lost distance.
 
-    The robot should drive at 0.4 m/s. It is held for 1 s, so it falls 0.4 m behind. After it has
-    made up for this distance, too high a speed is a fault.
+    The robot should drive at 0.4 m/s. It is held for 1 s, so it falls 0.4 m behind. When it has
+    made up for this distance and still drives too fast, this is a fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
@@ -258,8 +258,9 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
     """A driven robot drives on, because it has not received Stop.
 
-    If Stop is repeated, it may arrive. Therefore, the monitor reports a fault every 5 s, and the
-    driver sends Stop for each fault. The time from one fault to the next does not become longer.
+    The monitor reports a fault every 5 s, and the driver sends Stop for each fault, because a later
+    Stop may arrive. The time from one fault to the next does not become longer. It would become
+    longer for a pushed robot that has obeyed Stop.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -298,11 +299,11 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """Four impossible displacements in a row are a fault. A smaller number is not a fault.
+    """A board corrects its own odometry. Four impossible displacements in a row are a fault.
 
-    The outlier filter marks these displacements as impossible, but does not reject them. After a
-    possible displacement, the monitor counts from zero again. While the robot rolls out after the
-    fault, the monitor reports no second fault.
+    The outlier filter does not reject such displacements, because up to three in a row may be a
+    correction. After a possible displacement, the monitor counts from zero again. While the robot
+    rolls out after the fault, the monitor reports no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)
@@ -321,7 +322,7 @@ def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correct
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
     """A fault that occurs repeatedly is new to the user only the first time.
 
-    When the robot has obeyed a command in between, the same fault is new again.
+    After the robot has obeyed a command, the same fault is new again.
     """
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
@@ -351,7 +352,7 @@ def test_a_robot_that_obeys_late_and_with_slip_never_trips(
 ) -> None:
     """Commands are random. The robot obeys up to 0.1 s late, with a time constant of up to 0.2 s.
 
-    The only possible fault is "blocked", after which the robot is not stopped.
+    The monitor reports no fault except "blocked", which does not stop the robot.
     """
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0

@@ -2,9 +2,9 @@
 
 """Tests that an IMU frame is returned as soon as the packet with its last byte arrives.
 
-The tests use adapters that split the bytes into packets in different ways. An IMU frame can end
-with bytes that look like the next header. The decoder then uses the arrival times to find whether
-another frame is due.
+The tests use adapters that split the bytes into packets in different ways. The last bytes of an IMU
+frame can look like the header of another frame. The decoder then decides by the arrival times
+whether another frame has begun.
 """
 
 from collections.abc import Callable, Iterator
@@ -76,7 +76,7 @@ def behind_timer(timer_s: float) -> Handed:
 def test_hardly_a_frame_waits_for_the_next_packet(
     adapter: Callable[[], Handed], waits: float
 ) -> None:
-    """Hardly any IMU frame waits for the next packet of an adapter.
+    """Hardly any IMU frame must wait until the adapter delivers its next packet.
 
     A frame waits only if a delta may follow it, or if the adapter splits the frame.
     """
@@ -109,7 +109,7 @@ def test_an_empty_read_changes_nothing() -> None:
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
     """The line loses a byte. In the next ten seconds, the decoder does not regard the line as calm.
 
-    So it needs more evidence before it accepts a frame.
+    On a line that is not calm, the decoder needs more evidence before it accepts a frame.
     """
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}

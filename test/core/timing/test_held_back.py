@@ -18,9 +18,9 @@ HELD = 4095
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
-    """Return a bench after a stall of ``ticks`` ticks, in which an adapter held back all data.
+    """Let a robot drive while an adapter holds back all data for ``ticks`` ticks. Return the bench.
 
-    The robot drives on during the stall.
+    Then the adapter delivers its data, and the bench runs for two more seconds.
     """
     bench = Bench(BoardSettings(frame=frame))
     bench.open()

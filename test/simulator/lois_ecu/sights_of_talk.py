@@ -61,7 +61,7 @@ def appends_odometry(quirks: Quirks) -> bool:
 
 
 def clock_in_ms(quirks: Quirks) -> bool:
-    """Return whether the board's times are in ms, not in ns, as the driver's decoder finds."""
+    """Return whether the driver's decoder finds that the board's times are in ms, not in ns."""
     rig = Rig(quirks)
     rig.run(6.0)
     return rig.decoder.clock_unit == "ms"
@@ -81,7 +81,7 @@ def clock_stops_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_sending(quirks: Quirks) -> bool:
-    """Return whether the board loses more than 2 of 150 lines. Each line is sent only once."""
+    """Return whether the board loses more than 2 of 150 lines that are not repeated."""
     rig = Rig(quirks)
     rig.run(2.1)
     for number in range(150):
@@ -93,7 +93,7 @@ def deaf_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_counting(quirks: Quirks) -> bool:
-    """Return whether the board, at full speed, loses over 10 % of lines that are sent once."""
+    """Return whether the board, at full speed, loses over 10 % of lines that are not repeated."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(100, 100))
@@ -106,7 +106,7 @@ def deaf_while_counting(quirks: Quirks) -> bool:
 
 
 def button_waits_while_sending(quirks: Quirks) -> bool:
-    """Return whether the button cannot cut the motors' power while the board sends a record."""
+    """Return whether a press of the button leaves the motors on while the board sends a record."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(50, 50), RecordTorque(100, 100))
@@ -119,7 +119,7 @@ def button_waits_while_sending(quirks: Quirks) -> bool:
 
 
 def odometry_period_is_fixed(quirks: Quirks) -> bool:
-    """Return whether the periodic message 0x20 cannot be switched off."""
+    """Return whether the board still sends message 0x20 after its period was switched off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.ODOMETRY, PERIOD_OFF))
@@ -150,7 +150,7 @@ def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
 
 
 def terminal_mixes_sensors(quirks: Quirks) -> bool:
-    """Return whether sentences of the compass are forwarded in the GPS mode, too."""
+    """Return whether the board, in the GPS mode, also forwards sentences of the compass."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.GPS))
@@ -175,7 +175,7 @@ def one_ball_in_six_seconds(quirks: Quirks) -> bool:
     """Return whether the board delivers only one ball in six seconds.
 
     With this quirk, the board ignores a second request directly after the first one. It obeys a
-    request 6 s later.
+    third request 6 s later.
     """
     rig = Rig(quirks)
     rig.run(2.1)
@@ -245,7 +245,7 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """Return whether a record of 3 headings still has not come after the third sample."""
+    """Return whether the board has not sent a record of 3 headings after the third sample."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None

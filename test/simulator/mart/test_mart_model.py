@@ -45,7 +45,7 @@ def walk(rig: Rig, seed: int, steps: int) -> None:
 def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -> None:
     """A server is copied in the middle of random requests.
 
-    The copy then replies like the original.
+    Server and copy then receive the same requests, and give the same replies.
     """
     rig = Rig(seed=seed, front_m=3.0, rear_m=3.0)
     walk(rig, seed, 40)

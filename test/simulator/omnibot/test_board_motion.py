@@ -2,7 +2,7 @@
 
 """Tests of control frames: velocities, wheel speeds, stops and poses.
 
-A board takes poses if its switch is on "position".
+A board obeys poses only if its switch is on "position".
 """
 
 from math import hypot
