@@ -76,7 +76,7 @@ class Ending:
 
     @property
     def begun(self) -> bool:
-        """Whether a signal came or ``begin`` was called, so that the driver must end."""
+        """Whether the driver must end: a signal came, or ``begin`` was called."""
         return bool(select.select([self._wakes], [], [], 0)[0])
 
     def wait(self) -> None:

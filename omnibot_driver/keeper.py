@@ -81,7 +81,7 @@ class Keeper:
         return trouble
 
     def change(self, stop: Packets, emergency_stop: Packets) -> None:
-        """Send the guard new stop commands, without waiting for any process."""
+        """Send the guard new stop commands. Does not wait for the guard."""
         self.last_words = stop, emergency_stop
         if (process := self._process) is None:
             return

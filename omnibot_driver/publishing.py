@@ -193,7 +193,7 @@ class Publishing:
     def _change_time(self, jump: TimeJump) -> None:
         """Record whether the node's time is simulated. ROS calls this method at each change.
 
-        It would take a microsecond more for each event to ask ROS instead.
+        To ask ROS at each event instead would take a microsecond more per event.
         """
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 

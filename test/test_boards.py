@@ -111,7 +111,7 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
     """A board has the parameter ``baudrate`` if its ``traits.baudrate`` is true, and only then.
 
-    This trait means that the board's messages mention a baud rate.
+    If this trait is true, the driver's advice about a silent board names ``baudrate``.
     """
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))

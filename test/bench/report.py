@@ -46,7 +46,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     windows = 2 if quick else 6
     figures: list[Figure] = []
     for adapter in ADAPTERS:
-        say(f"latency, processor time, commands: {adapter}")
+        say(f"{adapter}: latency, processor time, commands")
         measured, node_memory = system.measurements(adapter, windows)
         figures += [*measured, system.commands(adapter, windows)]
     say("start")

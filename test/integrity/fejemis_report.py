@@ -197,7 +197,7 @@ def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
     jobs = [(sums, seed) for seed in seeds for sums in SUMS]
     total = pieces.scores_of(partial(one, seconds), jobs)
     lines = [
-        f"{len(seeds)} drives of {seconds:g} s, with sums and without:",
+        f"{len(seeds)} drives of {seconds:g} s for each row, with checksums and without:",
         "",
         "| fault | lines | values delivered | values wrong | odometry off by at most | bound | |",
         "|---" * 7 + "|",
@@ -212,7 +212,7 @@ def measure(seconds: float, seeds: range) -> tuple[list[str], bool]:
         most = f"1 wrong in {one_in:,}" if one_in else "none wrong"
         bound = f"{most}, {least:.0%} delivered, {1e3 * ASTRAY_M:g} mm" if least else "none"
         wrong = f"1 in {found.out / found.wrong:,.0f}" if found.wrong else f"0 of {found.out:,}"
-        with_sums = "with sums" if sums else "without sums"
+        with_sums = "with checksums" if sums else "without checksums"
         lines.append(
             f"| {fault} | {with_sums} | {delivered:.2%} | {wrong} | {1e3 * found.astray_m:.0f} mm |"
             f" {bound} | {'holds' if holds else '**missed**'} |"

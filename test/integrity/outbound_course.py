@@ -23,9 +23,10 @@ class Understood:
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the next write that is special. A write is special
-    in four cases: it begins or ends a motion; it waits for the line; a part of it may be discarded;
-    or the receiver misunderstands it.
+    ``alike_until``: for each write, the index of the first later write that is special, or the
+    number of writes if there is none. A write is special in four cases: it begins or ends a motion;
+    the line is still sending an earlier write; a part of it may be discarded; or the receiver
+    misunderstands it.
     """
 
     held: list[bytes]

@@ -63,9 +63,10 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Ways in which a busy computer reads a line.
+"""Functions that return the reads of a busy computer, by the name of the line.
 
-They include the delays of the computer, so ``stamp`` adds no delay.
+The times of these reads already contain the computer's delays. So the function ``stamp`` adds no
+delay to them.
 """
 
 

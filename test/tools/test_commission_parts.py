@@ -124,9 +124,9 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 
 
 def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
-    """Signs with one reversed axis are a mirror image, signs with x and y reversed are not.
+    """If one axis is reversed, the signs describe a mirror image of the robot.
 
-    Reversed x and y together are a turn by 180°.
+    If x and y are reversed, they describe a robot that is turned by 180°.
     """
     assert not mirrored((1, 1, 1))
     assert not mirrored((-1, -1, 1))

@@ -43,8 +43,10 @@ SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """
 Candidate = tuple[float, str, str]
-"""A possible line: its cost, and the texts of speed (m/s) and turn rate (degrees/s) without
-signs."""
+"""A possible line: its cost, its speed (m/s) and its turn rate (degrees/s).
+
+The last two are texts without signs.
+"""
 
 
 @lru_cache(maxsize=512)

@@ -164,7 +164,7 @@ class StallWatch:
     def _lacks_power(self, wheel: int) -> bool:
         """Return whether the controller gives a wheel no power.
 
-        It gives no power if the reported speed is not below the set-point.
+        This is so if the reported speed is at or above the set-point.
         """
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS

@@ -164,8 +164,8 @@ class Stops(Ground, ABC):
             self._turns.forget_setting()
         if self.jobs.moving:
             self.jobs.cancel(
-                f"{why or 'the reply to the move was lost'}; the robot was stopped: see the topic"
-                " `docked`, then call again"
+                f"{why or 'the reply to the move was lost'}; the robot was stopped; call again if"
+                " the topic `docked` is false"
             )
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())

@@ -39,7 +39,7 @@ class SimulatedBoard(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Connections of the board. The index of a packet is an index of this tuple."""
+        """Connections of the board. The channel number of a packet is an index of this tuple."""
 
     @property
     def tick_s(self) -> float:

@@ -118,8 +118,8 @@ class Encoder:
     def turn(self, turns: float) -> list[tuple[float, bool, int]]:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
-        An edge has three values. The first is its time, as a fraction of the step. The second tells
-        whether the level that ended at this edge was a long one. The third is the direction of the
+        An edge has three values. The first is its time, as a fraction of the step. The second is
+        True if a long level ended at this edge. The third is the direction of the
         disc: 1 forward, -1 backward.
         """
         before = self._periods

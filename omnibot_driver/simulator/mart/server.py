@@ -28,7 +28,10 @@ Sender = object
 
 
 class Reply(NamedTuple):
-    """A datagram that leaves ``port`` for ``sender`` at ``at_s``, in s since construction."""
+    """A datagram from the server's ``port`` to ``sender``, the sender of a request.
+
+    ``at_s``: when it is sent, in s of the server's time.
+    """
 
     at_s: float
     port: int

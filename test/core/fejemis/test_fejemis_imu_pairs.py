@@ -124,7 +124,7 @@ def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[flo
 
 
 def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -> list[Read]:
-    """Divide the lines into the reads of a fast host that stalls at times, for up to 0.15 s."""
+    """Divide the lines into the reads of a fast host. Some reads are late by up to 0.15 s."""
     reads: list[Read] = []
     free_at = 0.0
     for _, some in itertools.groupby(lines, lambda line: line.sent_s):

@@ -144,10 +144,9 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """A busy computer reads three reports at once, 0.4 s after the three reports before them.
+    """A busy computer reads three reports every 0.4 s. The reports are late, but none is lost.
 
-    Such a pause does not mean that reports were lost, so no fall of the speed was missed. The
-    constant speed therefore shows that the wheel rolls.
+    So no fall of the speed was missed. The constant speed therefore shows that the wheel rolls.
     """
     wheel = told(13, 13, 13)
     for _ in range(10):

@@ -340,9 +340,9 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """The server may report at once that the check of the IMU has failed.
+    """The server may report at once that the check of the IMU has failed, for example without IMU.
 
-    An example is a missing IMU. So the driver accepts an early failure. It does not accept an early
+    So the driver accepts an early failure. It does not accept an early
     ``ok``, because a successful check takes some time.
     """
     talk = conversation()

@@ -269,7 +269,7 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """A rejected forward drive (RM) moves the robot later, because a copy of RM arrives late.
+    """The server rejects a forward drive (RM). Later, it obeys a late copy of this RM.
 
     At this time, the network also loses replies. The driver stops the robot. It does not regard the
     server as defective, so it does not refuse motion permanently.

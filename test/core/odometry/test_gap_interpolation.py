@@ -61,7 +61,7 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
     """A displacement has an unknown duration, for example after a pause. So its speed is unknown.
 
-    Therefore, it is not used to estimate the motion in a gap.
+    Therefore, this displacement is not used to estimate the motion in a gap.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)

@@ -242,7 +242,7 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
     """A false delta comes too early. The true delta, with the same count, follows.
 
-    The same count is not taken for a wrap: no delta is counted as lost.
+    The repeated count does not mean that the counter has wrapped. So no delta is counted as lost.
     """
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)

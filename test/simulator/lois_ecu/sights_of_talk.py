@@ -160,7 +160,8 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 def terminal_passes_input_on(quirks: Quirks) -> bool:
     """Return whether the board obeys fewer than 20 of 100 lines in compass mode.
 
-    The board forwards each line at 4800 baud. During this time, it receives nothing.
+    With this quirk, the board forwards each line to the compass at 4800 baud. Until this has ended,
+    it reads no other line.
     """
     rig = Rig(quirks)
     rig.run(2.1)

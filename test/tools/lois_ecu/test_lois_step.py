@@ -108,7 +108,7 @@ def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant(
 
 
 def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
-    """The times between ticks have only random noise, and the marks are evenly spaced.
+    """The encoder's marks are evenly spaced, and the times between ticks have only random noise.
 
     The tool finds no misplaced marks.
     """
