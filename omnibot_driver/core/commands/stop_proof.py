@@ -52,8 +52,8 @@ class StopProof:
 
     * ``proved``: whether a standstill is proved. Two events prove it: the robot stood still for
       ``still_s`` after Stop, or the board paused. The value becomes False when a motion command is
-      sent, or when a measured displacement shows a motion.
-    * ``owed``: True from the last motion command that was sent until a standstill is proved.
+      sent, when a measured displacement shows a motion, or when the proof is discarded (``begin``).
+    * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
     * ``measured``: whether a measured displacement has arrived later than ``UNDER_WAY_S`` after
       Stop.
     """

@@ -60,7 +60,7 @@ class Inbound:
     def take_relay(self) -> float | None:
         """Return the new angle of the front wheel in rad, which must be sent to the drive board.
 
-        A second call returns None until another angle has arrived.
+        Return None if no angle has arrived since the last call.
         """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad

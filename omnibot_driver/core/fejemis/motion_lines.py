@@ -19,10 +19,10 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Lowest commanded speed, in m/s, for which the front board's line of a curve contains a speed.
+"""Limit, in m/s, for the commanded speed in a curve.
 
-For a lower commanded speed, the line contains the speed 0. The reason: only few numbers below this
-limit can be sent safely.
+Below this limit, the front board's line contains the speed 0. The reason: only few numbers below
+the limit can be sent safely.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004

@@ -43,7 +43,7 @@ RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
-In this time, stopped wheels come to rest, and four tick reports arrive.
+It is long enough for stopped wheels to come to rest, and for four tick reports to arrive.
 
 After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. But it must not
 accept small counts that stay the same although a reset would set them to zero, because they show

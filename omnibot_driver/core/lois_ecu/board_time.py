@@ -56,10 +56,10 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Two estimates of how much the board's clock has fallen behind since the first tick
-        report, in s: the change of the difference "arrival time minus board's time".
+        """How far the board's clock has fallen behind since the first tick report, in s.
 
-        The first estimate assumes that the board's clock always runs. The second one assumes that
+        This is the change of the arrival time minus the board's time. The list has two estimates of
+        it. The first one assumes that the board's clock always runs. The second one assumes that
         this clock stops while the board sends.
         """
         self._kept: tuple[deque[Point], deque[Point]] = (

@@ -26,8 +26,8 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of counts after which the driver regards a start command as lost. It includes only counts
-that differ by at most 1 from the last count before the command."""
+"""If this number of counts after a start command differ by at most 1 from the last count before the
+command, the driver assumes that the command was lost."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -94,9 +94,9 @@ class OutlierFilter:
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. Such a correction can look like an
-      impossible motion. So if this is True, the filter passes an impossible displacement on if it
-      is finite. In this displacement, it sets ``measured`` to False. If the duration is known and
-      not 0, it also sets ``possible`` to False.
+      impossible motion. So if ``corrected`` is True, the filter passes on an impossible but finite
+      displacement, with ``measured`` set to False. If the duration of the displacement is known and
+      not 0, the filter also sets ``possible`` to False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -106,7 +106,7 @@ class OutlierFilter:
         self._imu_leaps = _Spikes(STILL, knocked=3)
         self._motion_leaps = _Spikes(BACK, knocked=0)
         self._lasted_s = 0.0
-        """Duration in s of the last displacement that had a known duration above 0."""
+        """Duration in s of the last possible displacement with a known duration above 0."""
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
         """The readings that the filter holds: a displacement that changed implausibly much, and
@@ -312,8 +312,8 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether one flipped bit can explain a change.
 
-        ``step``: size of the change. It may differ from the value of a bit by ``OUT_OF_PROPORTION``
-        times the largest recent change, because the readings vary.
+        ``step``: size of the change. It may differ from the value of a bit by up to
+        ``OUT_OF_PROPORTION`` times the largest recent change, because the readings vary.
 
         ``value``: magnitude after the change. If it is at the end of the scale, the result is
         False, because a knock against the robot can also cause such a value.

@@ -42,7 +42,8 @@ def assert_still_refused(bench: Bench) -> None:
 def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
     """A power off is pending, and the e-stop is latched. Then the user calls ~/start.
 
-    The driver sends only ``on``. This line cancels the power off, so the power stays on.
+    The driver sends ``on``, but not ``start``. The line ``on`` cancels the power off, so the power
+    stays on.
     """
     bench.estop(True)
     bench.session.request(Request.START, None, bench.now)

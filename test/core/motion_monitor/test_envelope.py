@@ -182,11 +182,10 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """A robot moves faster than its set-points allow. This reduces the wind-up.
+    """A robot moves faster than its set-points allow. The wind-up shrinks by the extra distance.
 
     The wind-up is the distance that the wheel controllers may still drive in addition to the
-    commanded motion. The distance of this extra motion is subtracted from it. It does not fall
-    below zero.
+    commanded motion. It does not fall below zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

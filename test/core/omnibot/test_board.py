@@ -196,7 +196,7 @@ def test_the_first_delta_has_lost_nothing() -> None:
 
 
 def test_the_poses_have_a_counter_of_their_own() -> None:
-    """A pose between deltas 1 and 2 has the count 99. This does not mean lost deltas."""
+    """A pose between deltas 1 and 2 has the count 99. No delta is counted as lost."""
     assert lost(bot(), moved(1), PoseFrame(0.0, 0.0, 0.0, 99), moved(2)) == [0, 0]
 
 

@@ -247,9 +247,10 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""Cases by name. Two bytes of a delta have already come; the reads of each case bring the rest.
+"""Cases by name. In each case, two bytes of a delta have already come.
 
-Each text is one read: the time in ms since the previous read, and the bytes of the read.
+The reads bring the rest of this delta, and the frames after it. Each text is one read: the time in
+ms since the previous read, and the bytes of the read.
 """
 
 
