@@ -61,7 +61,7 @@ class SharedSession:
         """Whether the link wrote its last Stop to every line.
 
         The port may be lost while the link ends. Then the reader opens it again and writes Stop.
-        After this Stop, ``told`` becomes True only if the robot was not yet proved to stand still
+        After this Stop, ``told`` becomes True only if a standstill was still to be proved
         (``Shutdown.owed``).
         """
         self.stood = False

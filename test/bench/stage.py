@@ -28,8 +28,8 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Largest number in the first word of IMU frames. From frame to frame, the number goes up from 0 to
-``TURN``, and down again."""
+"""Largest number in the first word of IMU frames. The number changes by 1 from frame to frame: it
+goes up from 0 to ``TURN``, then down to 0, and so on."""
 NOISE = 997
 """Number of ticks after which the random noise of the gyro and of the acceleration repeats."""
 

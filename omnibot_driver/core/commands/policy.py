@@ -18,8 +18,8 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.05
-"""Shortest time in s for which Stop is repeated. Two Stops are at most 0.05 s apart, so the last
-one is sent at least 1 s after the first one."""
+"""Shortest time in s for which Stop is repeated. ``SetpointStream`` sends successive Stops at most
+0.05 s apart, so the last one is sent at least 1 s after the first one."""
 UNPROVED_S: Final = 5.0
 """Longest time, in s, for which Stop is repeated without proof that the robot stands still."""
 ROUNDING_S: Final = 1e-6

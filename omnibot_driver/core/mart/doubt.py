@@ -53,10 +53,11 @@ it has the same sign in all intervals between two encoder counts. The random err
 intervals are independent.
 """
 ASTRAY: Final = 0.7
-"""Factor for the error of a driven distance that an uncertain heading causes.
+"""Factor for a position error that an uncertain heading causes.
 
-This error, as a fraction of the distance, is the factor times the variance of the heading (rad²),
-but at most 1. An error of this size is assumed along the motion, and a second one across it.
+This error, as a fraction of the driven distance, is the factor times the variance of the heading
+(rad²), but at most 1. An error of this size is assumed along the motion, and a second one across
+it.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
@@ -132,11 +133,11 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the constant heading error that the robot has at the beginning of a motion.
+        """Store the constant heading error at the beginning of a motion.
 
         Call this when a motion begins. The constant error comes from turns that were computed from
-        the commands. The motion changes this error. If the server reports the heading during the
-        motion, ``heading_told`` sets the error back to the stored value.
+        the commands, and the new motion may change it. If the server reports the heading during
+        this motion, ``heading_told`` sets the error back to the stored value.
         """
         self._bend_before_rad = self._levers[2][2]
 

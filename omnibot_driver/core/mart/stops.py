@@ -63,8 +63,8 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel may turn unseen. The left wheel has no encoder.
 
-``STUCK_S``: the right wheel is stuck, and the server does not report the heading in this motion.
-The left wheel may turn for this time before the driver notices.
+``STUCK_S``: the driver stops the robot because it does not seem to move. If only the right wheel is
+stuck, the left wheel may have turned for this time before the stop.
 
 ``COASTS_S``: the driver stops the robot because a wheel is blocked. When the right wheel is at
 rest, the server ends the measurement of the motion. The left wheel may still coast for this time.
@@ -153,9 +153,8 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: the fault, for a notice to the user; empty without a fault. After a fault, the
-        user's command is discarded, too. If the driver already refuses the motion in progress, the
-        command is kept.
+        ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
+        the user's command, unless the driver already refuses the motion in progress.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """

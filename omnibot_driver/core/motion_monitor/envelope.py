@@ -64,7 +64,8 @@ _DIRECTIONS: Final = tuple(
 """Directions in which the distance to the hull is computed.
 
 The direction of the true distance can be between two of them. Then the computed distance is too
-small, by at most 2 %.
+small: by up to 2 % of the distance, plus a tenth of the hull's length. The error is largest near
+the middle of a long side.
 """
 
 
@@ -102,7 +103,7 @@ def outside(
 
 
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
-    """Return whether the motion is near a set-point, or on the way from one set-point to the next.
+    """Return whether the motion is near a set-point, or near the way from one to the next.
 
     Such motion is inside the envelope. The caller makes this quick check before the exact one,
     ``outside``.

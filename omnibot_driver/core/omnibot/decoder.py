@@ -182,7 +182,7 @@ class FrameDecoder:
                 return
 
     def _walk(self, found: list[Frame], closed: bool) -> bool:
-        """Accept consecutive frames. If a frame is uncertain, stop there and return False."""
+        """Accept consecutive frames. If a frame is uncertain, stop and return False."""
         held, gaps, expectation = self._held, self.pauses.gaps, self.expectation
         order, context = self._pose_byte_order, self.context
         at, size, walk = 0, len(held), Walk(context)
@@ -245,7 +245,7 @@ class FrameDecoder:
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept the frames of ``walk`` except the last two.
 
-        The data after these frames are odd, so the last two frames are uncertain. Always return
+        The bytes after the last frame are odd, so the last two frames are uncertain. Always return
         False, which is the result of ``_walk`` if a frame is uncertain.
         """
         believed = len(walk.frames) - 2

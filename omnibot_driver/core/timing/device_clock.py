@@ -91,7 +91,7 @@ class DeviceClock:
         """Time in s of the last read that brought a new tick.
 
         The board's ticks are a period apart. So if the next read with a new tick follows within
-        half a period, the ticks had waited to be read.
+        half a period, the earlier tick had waited to be read.
         """
         self._awaited: Point | None = None
         """Number of the next tick, and the earliest time in s at which the last byte of its sample

@@ -18,7 +18,9 @@ INPUT_DEPTH = 600
 class Uart:
     """The serial port.
 
-    ``loses``: whether bytes are lost while interrupts are off. Only the first of them is then kept.
+    ``loses``: whether the port keeps only the first of the bytes that arrive while interrupts are
+    off, and loses the others.
+
     ``input``: characters that were received but not read yet.
     """
 

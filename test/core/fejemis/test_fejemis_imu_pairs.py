@@ -124,7 +124,10 @@ def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[flo
 
 
 def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -> list[Read]:
-    """Divide the lines into the reads of a fast host. Some reads are late by up to 0.15 s."""
+    """Divide the lines into the reads of a fast host, which is busy at times for up to 0.15 s.
+
+    ``stalls``: probability that the host is busy before it reads a line.
+    """
     reads: list[Read] = []
     free_at = 0.0
     for _, some in itertools.groupby(lines, lambda line: line.sent_s):
@@ -277,8 +280,9 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, arrive twice or arrive late. Only one kind of pair has lines of two samples.
 
-    Both lines of such a pair are late, and no pose follows in the same read. Then nothing in the
-    stream shows that the lines belong to different samples.
+    In such a pair, one line is read late, the other line is read less than 5 ms later, and no pose
+    follows in the same read. Then nothing in the stream shows that the lines belong to different
+    samples.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -313,8 +317,8 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
     """The host reads every 0.2 s. Each read begins with samples, before its first pose.
 
-    These samples wait for this pose, which shows that the board was not silent. Then the driver
-    publishes them, too.
+    These samples wait for that pose, which shows that the board was not silent. Then the driver
+    publishes the samples, too.
     """
     bench = nominal()
     bench.run(3.0)

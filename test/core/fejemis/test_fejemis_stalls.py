@@ -101,9 +101,9 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """The driver needs long for the first read after a stall, so the second read is late too.
 
-    Bytes are lost between the two reads. The sampling time of a sample that arrives after lost
-    bytes is unknown until the next pose arrives. So the driver does not publish the first sample
-    after the lost bytes. All other samples get the times at which the board took them.
+    Bytes are lost between the two reads. One sample arrives after the lost bytes and before the
+    next pose. This pose shows that lines are missing, so the driver does not publish the sample.
+    All other samples get the times at which the board took them.
     """
     bench = nominal()
     bench.run(1.0)

@@ -132,9 +132,9 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel can roll at a constant speed above its set-point.
 
-    Without feed-forward, such a wheel would get no power and become slower. So only without
-    feed-forward, the constant reported speed shows that the wheel is at rest. With feed-forward, it
-    shows this only if the other wheel's speed changes meanwhile.
+    Without feed-forward, such a wheel would get no power and become slower. If its reported speed
+    is constant nevertheless, the wheel is at rest. With feed-forward, a constant speed shows this
+    only if the other wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -153,7 +153,7 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """The board reports both wheels at 1.3 times their set-points. No wheel looks stalled.
+    """The board reports both wheels at 1.3 times their set-points. Neither looks stalled.
 
     In backward motion, wheels that roll can be too fast, but both by about the same factor. So both
     wheels really roll. If only one wheel is reported at such a speed, this wheel looks stalled: the

@@ -24,7 +24,7 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    What is wrong depends on the situation:
+    What counts as wrong depends on the situation:
 
     * If the IMU is dead, or if the driver has given up: only a crash of the server.
     * While the driver finds out which motion is in progress: a crash, and a command port that

@@ -255,9 +255,9 @@ def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
 
 
 def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> None:
-    """The motors differ by 18 %, and /diagnostics shows this measured value.
+    """The motors differ by 18 %, and /diagnostics shows their balance as the driver measured it.
 
-    It shows the value although the driver itself assumes a difference of at most 8 %.
+    For its own commands, the driver assumes a difference of at most 8 %.
     """
     bench = MartBench("source", motor_inequality=0.18).ready()
     bench.command(0.3, 0.0, 6.0)

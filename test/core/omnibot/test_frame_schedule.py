@@ -57,8 +57,7 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
     """An IMU frame and a delta are lost before a pose.
 
-    The schedule does not count the lost IMU frame when the pose arrives. It counts it only when the
-    next frame arrives.
+    The result for the pose is 0. The lost IMU frame is counted in the result for the next frame.
     """
     rhythm = nominal(0)
     for _ in range(4):

@@ -86,7 +86,7 @@ def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: ra
     """For 4 s, reads are slightly late. Their lower bounds are wrong: later than the true times.
 
     These lower bounds contradict the upper bounds of the other reads. An upper bound is always
-    right, because no tick is later than it. So the fit discards the lower bounds.
+    right, because no read comes before its tick. So the fit discards the lower bounds.
     """
     _, late_s = followed(
         0.0,
