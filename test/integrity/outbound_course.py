@@ -24,9 +24,9 @@ class Understood:
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
     ``alike_until``: for each write, the index of the first later write that is special, or the
-    number of writes if there is none. A write is special in four cases: it begins or ends a motion;
-    the line is still sending an earlier write; a part of it may be discarded; or the receiver
-    misunderstands it.
+    number of writes if there is none. A write is special in three cases: it begins or ends a
+    motion; the line is still sending an earlier write; or the receiver does not understand exactly
+    the control frames in it, for example because the write contains a letter.
     """
 
     held: list[bytes]

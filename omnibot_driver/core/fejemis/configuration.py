@@ -43,9 +43,9 @@ the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute. 
 the larger one: the board prints few digits, so the relative error of a small number can be above
 ``NEAR``."""
 HALF: Final = 0.51
-"""Another tolerance for the same comparison, in units of the last digit that the board prints. The
-comparison uses it if it is smaller than the tolerance from ``NEAR`` and ``DIGIT``. It is a little
-more than half a unit, because the board's numbers have single precision."""
+"""Tolerance for the same comparison as ``NEAR``, in units of the last digit that the board prints.
+The comparison uses it if it is smaller than the tolerance from ``NEAR`` and ``DIGIT``. It is a
+little more than half a unit, because the board's numbers have single precision."""
 
 
 class Configuration:

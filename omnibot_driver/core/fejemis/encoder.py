@@ -112,7 +112,7 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist of the robot's body that ``packets`` command.
 
-        The caller passes packets that were sent. ``encode`` stores its last packets, together with
+        The caller passes packets that were sent. For a motion, ``encode`` stores the packets and
         the twist that it has computed for the front wheel's angle. If ``packets`` are equal to the
         stored ones, the result is the stored twist. All other packets are regarded as a stop. Each
         call deletes the stored packets, so they are used only once.

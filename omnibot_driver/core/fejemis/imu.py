@@ -25,7 +25,7 @@ REGULAR: Final = 0.6
 The driver uses this limit only if both samples seem to be late by about a period or more. There are
 two possible causes:
 
-* An earlier sample was lost. Then both samples are in time, and arrive about one period apart. The
+* An earlier sample was lost. Then both samples are on time, and arrive about one period apart. The
   time between their arrivals is above the limit.
 * The host has stalled. Then both samples have waited, and are read shortly after one another. The
   time between their arrivals is below the limit, and no sample was lost.

@@ -31,9 +31,9 @@ SILENT_S: Final = 0.1
 """Longest usual time, in s, without gyro and acceleration lines.
 
 After a longer time, it is unknown whether the board sent nothing, or whether the host only read
-late. The next pose shows this. Until then, each new pair must wait, even if its two lines come
-close together. If the board sent nothing, the sampling time of the pair is unknown, so the pair is
-rejected.
+late. The next pose shows which of the two is true. Until then, each new pair must wait, even if its
+two lines come close together. If the board sent nothing, the sampling time of the pair is unknown,
+so the pair is rejected.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver. During this time, every new pair must wait for the next
@@ -68,7 +68,7 @@ between two pairs. A negative counter shows that they usually come between the t
 pair."""
 UNPOSED: Final = 20
 """Limit for the number of gyro lines, and of acceleration lines, since the last pose. If one of the
-two numbers exceeds it, the driver no longer waits for the next pose: it rejects the pair."""
+two numbers exceeds the limit, a pair that still waits for the next pose is rejected."""
 
 
 @dataclass(slots=True)
@@ -117,7 +117,8 @@ class ImuPairs:
         unknown."""
         self._evidence_s = 0.0
         """The sum of the intervals before gyro lines, minus the sum of the intervals before
-        acceleration lines, in s. ``SUREST_S`` explains how it shows which line comes first."""
+        acceleration lines, in s. If it is positive, the gyro line of a sample comes first; the text
+        on ``SUREST_S`` gives the reason."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None

@@ -100,9 +100,9 @@ class PoseOdometry:
         The list is empty if there is no displacement (see the method ``pose``).
 
         The list also contains a PoseReading every 0.2 s, after a restart of the board, and at the
-        beginning of a new coordinate frame. The PoseReading is the sum of all displacements that
-        were returned. If the driver rejects one of these displacements in a later check, the sum
-        still contains it.
+        beginning of a new coordinate frame. The PoseReading is the pose with which the coordinate
+        frame began, plus all displacements that were returned since then. If the driver rejects one
+        of these displacements in a later check, the PoseReading still contains it.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

@@ -22,8 +22,8 @@ STALLED_S: Final = 2.0
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 LEAST_TICKS: Final = 2
-"""Least number of ticks in ``STALLED_S`` that a wheel must make by its set-point. A wheel with a
-lower set-point is never regarded as stalled, because it may show no motion although it rolls."""
+"""Least number of ticks in ``STALLED_S`` that a set-point must command. A wheel with a lower
+set-point is never regarded as stalled, because it may show no motion although it rolls."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
@@ -60,8 +60,8 @@ class StallWatch:
         self.may_roll = [False, False]
         self._quiet = [0, 0]
         """For each wheel: number of reports without motion. It is set to zero when the wheel turns,
-        when a command starts the wheel, and when ``stalled`` returns the wheel as stalled. A report
-        is counted only if it could have shown a motion of the wheel."""
+        when a command starts or reverses the wheel, and when ``stalled`` returns any wheel as
+        stalled. A report is counted only if it could have shown a motion of the wheel."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None

@@ -49,8 +49,8 @@ TRAITS: Final = Traits(
     },
 )
 ANSWERED: Final = NoticeReading("", halt=False)
-"""A reading that only shows that the server answers, and has no other effect. NOTHING_MEASURED
-cannot replace it, because it makes the motion monitor forget its earlier measurements."""
+"""A reading that only shows that the server answers, and has no other effect. NOTHING_MEASURED is
+not used for this, because it makes the motion monitor forget its earlier measurements."""
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
 FARTHEST_M: Final = 1000.0
@@ -287,7 +287,7 @@ class Conductor:
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Do nothing: all these packets come from the pilot, which has recorded them itself."""
+        """Do nothing: these are the packets of ``MartBoard.wake``, which the pilot repeats."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now."""

@@ -280,8 +280,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        It is, if three conditions are true: ``word`` is a query, an equal reply to another query or
-        to a move has just come, and the last reply to ``word`` was different.
+        This is so if three conditions are true: ``word`` is a query, an equal reply to another
+        query or to a move has just come, and the last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

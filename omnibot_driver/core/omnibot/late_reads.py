@@ -4,7 +4,7 @@
 
 If the line was idle within a supposed frame, bytes were lost there: the beginning and the end of
 the supposed frame come from different ticks. So all later frames seem late by whole ticks. If only
-the reader was late, later frames are in time again.
+the reader was late, later frames are on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
 contains, or which frames are accepted.
@@ -30,7 +30,7 @@ from omnibot_driver.core.omnibot.schedule import TICK_S
 IDLE_S: Final = 0.1
 """Long pause in s: ten of the board's ticks. An adapter only causes pauses of 16 ms or less."""
 HALF_TICK_S: Final = TICK_S / 2
-"""Half of a tick, in s. A frame that is late by less than this is regarded as in time."""
+"""Half of a tick, in s. A frame that is late by less than this is regarded as on time."""
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board within a frame."""
 NEAR_S: Final = 2e-3

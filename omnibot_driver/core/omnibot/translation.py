@@ -37,9 +37,9 @@ DELTA_LSB: Final = 1e-4
 MOST_TEXTS_LOST: Final = 9
 """Largest number of "Paused" texts that can have been lost since the last received one.
 
-The counter in the texts shows how many were lost. The board sends one text a second, and answers a
-reset within 9 s. So while the driver waits for this answer, at most 9 texts can be lost. If the
-counter changes by more, the board has restarted, and its counter has begun again.
+The counter in the texts shows how many were lost. The board sends one text a second, and the driver
+waits less than 10 s for the result of a reset. So in this time, at most 9 texts can be lost. If the
+counter shows more, the board has restarted, and its counter has begun again.
 """
 FULL: Final = 4000
 """Number of bytes in a read from which on the kernel's buffer of 4 KiB counts as full.

@@ -58,8 +58,8 @@ class Motion:
 
     watching: whether the module ``alarms`` supervises the motion.
 
-    posts: number of notices that the method ``wait`` of the server has not taken yet. Each start
-    and each end of a motion of this kind gives one notice.
+    posts: number of reports of a start or an end of a motion of this kind that the server keeps
+    for its method ``wait``.
 
     right, left: motor registers, as the server knows them.
 

@@ -30,7 +30,7 @@ Sender = object
 class Reply(NamedTuple):
     """A datagram from the server's ``port`` to ``sender``, the sender of a request.
 
-    ``at_s``: when it is sent, in s of the server's time.
+    ``at_s``: when it is sent, in s, by the server's clock ``now_s``.
     """
 
     at_s: float
@@ -171,8 +171,8 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
 
-        ``post`` may have kept an earlier report of this kind that no port waited for. Then this
-        report is used, and ``then`` is called now.
+        If ``post`` has kept such a report, because no port waited for it, use this report, and call
+        ``then`` now.
         """
         motion = self.motions[kind]
         if motion.posts:

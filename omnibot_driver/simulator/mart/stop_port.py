@@ -33,11 +33,12 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", motion: Motion) -> bool:
-    """Stop an uncontrolled motion (F, B, RM, R, L), if it is not already stopping.
+    """Stop an uncontrolled motion (F, B, RM, R, L).
 
     Return whether the caller must wait for the end of the motion.
 
-    There is one exception: a drive (F, B, RM) that the server does not supervise is not stopped.
+    A motion that is already stopping is not stopped again. A drive (F, B, RM) that the server does
+    not supervise is not stopped at all.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

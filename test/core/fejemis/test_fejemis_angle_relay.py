@@ -132,9 +132,9 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     The driver adds the rounding error of each angle to the next angle. Nevertheless, no angle in
     its lines exceeds 90°.
 
-    The limit of 90° also holds for damaged lines. The test removes two characters from each line
-    with a checksum. It chooses them so that the checksum does not detect their loss. From each line
-    without a checksum, the test removes one character.
+    The limit of 90° also holds for damaged lines. From a line with a checksum, the test removes any
+    two characters whose loss the checksum does not detect. From a line without a checksum, it
+    removes any one character.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

@@ -112,9 +112,9 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """A jump of the board's clock makes the delay of the next tick report irregular.
 
-    All reads are in time, so the estimated delay is usually about 0. Then the board's clock jumps
-    by 0.05 s or 0.2 s, ahead or back. The estimated delay of the next report differs from 0 by as
-    much.
+    All reads are on time, so the estimated delay is about 0, and not irregular. Then the board's
+    clock jumps by 0.05 s or 0.2 s, ahead or back. The estimated delay of the next report differs
+    from 0 by the same amount.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

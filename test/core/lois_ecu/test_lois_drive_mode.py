@@ -36,7 +36,7 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
-    """The user sets duty mode in a forward drive, then drives backward. Odometry shows this.
+    """The user sets duty mode in a forward drive, then drives backward. Odometry goes back, too.
 
     After a Stop, the public firmware still has the RPM target of the forward drive. While this
     target is positive, the firmware counts all ticks as forward. So the driver clears the target

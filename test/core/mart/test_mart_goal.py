@@ -207,7 +207,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     """The command for the turn to a goal is lost. Then the late ok to an IMU check arrives.
 
     The driver must not take this ok for the reply to the turn command. The encoder still shows the
-    count of the previous motion. The odometry does not add this count again.
+    count of the previous motion, and the odometry does not add this count again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)

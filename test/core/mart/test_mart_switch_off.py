@@ -340,8 +340,8 @@ def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> 
 
     The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM. The
     server's reply ``ok`` to MSM arrives twice, and the driver's next RST IMU (check of the IMU) is
-    lost. The driver does not conclude from the second ``ok`` that the server can be stopped again.
-    It gives a notice: the server still reports a motion although the robot is at rest.
+    lost. The driver does not conclude from the second ``ok`` that SRM is safe again. It gives a
+    notice: the server still reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -186,8 +186,8 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 def test_settling_removes_nothing_but_the_gap() -> None:
     """A pose that does not end a gap leaves the covariance unchanged.
 
-    It contains the same errors as the odometry, because the board also computes its pose from the
-    wheels.
+    Such a pose contains the same errors as the odometry, because the board also computes its pose
+    from the wheels.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -105,8 +105,8 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
     """A robot in free fall sends an IMU frame with an acceleration word of -6, -5 or -4.
 
-    The bytes of -6 are the header of an IMU frame. So the decoder loses the frame with -6, but no
-    other frame. Above 0.5 g, the decoder does not lose a frame for this reason.
+    The bytes of -6 are equal to the header of an IMU frame. So the decoder loses the frame with -6,
+    but no other frame. Above 0.5 g, the decoder does not lose a frame for this reason.
     """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)

@@ -246,7 +246,7 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """Return whether the board has not sent a record of 3 headings after the third sample."""
+    """Return whether a record of 3 headings is still missing after the third sample."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None

@@ -51,8 +51,7 @@ def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board
 ) -> None:
     """The robot drives 0.6 m and stops when the commands end. Odometry is within 3 cm of the truth.
 
-    The driver replaces the board's own controller gains, because with the board's own gains the
-    robot would swerve.
+    The driver replaces the board's own controller gains, with which the robot would swerve.
 
     Then the board restarts. The driver writes its gains again, and the robot obeys new commands.
     The pose in odom continues from its value before the restart. At the end, the error of the pose
