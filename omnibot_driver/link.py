@@ -28,8 +28,8 @@ from omnibot_driver.transports import Transport
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s.
 
-The reader thread may itself wait for the guard process. It kills a guard that has hung for 2.5 s.
-Only the end of a guard in an uninterruptible sleep takes longer.
+The reader thread may itself wait for the end of the guard process. If the guard has not ended after
+2.5 s, the reader kills it. The guard then ends at once, unless it is in an uninterruptible sleep.
 """
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the

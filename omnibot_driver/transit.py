@@ -67,8 +67,8 @@ class Delay:
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
     * ``sent_ns``: time of sending by our clock. While the offset of the sender's clock is unknown,
-      there are two possible times: the estimated time, and the sender's own time. Later, there is
-      only the estimated time.
+      there are two possible times: the estimated time, and the time by the sender's own clock.
+      Later, there is only the estimated time.
     """
 
     total_s: float

@@ -43,8 +43,8 @@ class Bound:
     ``long_in``: the number N in "at most one uncommanded set-point of over 2 ms in N control
     frames".
 
-    ``overdue``: whether two more errors are forbidden: the robot still drives at a time when it
-    must be at rest, and the robot still drives at the end of the trial.
+    ``overdue``: whether it is forbidden that the robot still drives when it must be at rest, or at
+    the end of the trial.
     """
 
     share: float = 1.0

@@ -84,8 +84,8 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 ) -> None:
     """IMU or odometry messages are lost for 2 s during a turn.
 
-    The report does not compare gyro and wheels in this gap. In the rest of the log they agree, so
-    the report calls them good.
+    The report does not compare gyro and wheels in this gap. In the rest of the log, they agree, so
+    the finding of the report is good.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)

@@ -30,7 +30,7 @@ MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
 """Number of times that RPM 0/0 is sent after a Stop. One time would be enough, but lines may be
 lost. While the robot stays stopped, RPM 0/0 is sent alone. If the robot drives again before this
-number is reached, RPM 0/0 is sent directly before each set-point until it is reached."""
+number is reached, RPM 0/0 is sent directly before each of the next RPM set-points."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

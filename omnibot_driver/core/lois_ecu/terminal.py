@@ -112,7 +112,7 @@ class ModeChange:
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
-        """Return the command to send now, or None. A mode is changed only after a standstill.
+        """Return the command to send now to stop the robot before a change, or None.
 
         First, the driver sends Stop. When it sees the robot at rest, or after ``UNPROVED_S``, it
         sends RPM 0/0 instead, which clears the board's RPM target. This is necessary because of the

@@ -27,7 +27,7 @@ ROLLS_S, ROLLS_AFTER_MOVE_S, ROLLS_LONG_S = 0.3, 0.6, 1.2
 ``ROLLS_AFTER_MOVE_S``: after a controlled move. The server replies to a failed move at once, while
 the robot still coasts.
 
-``ROLLS_LONG_S``: after a reply that reports wheels in motion.
+``ROLLS_LONG_S``: after a reply which says that the wheels did not stop in time.
 """
 
 

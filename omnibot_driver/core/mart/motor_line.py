@@ -76,8 +76,8 @@ class MotorLine:
         """Record that the motor does not turn with ``units``.
 
         If the line gives a positive speed for these units, lower its offset, so that the speed
-        becomes zero. But perhaps an obstacle holds the wheel. So the offset is then as uncertain as
-        it was before the line learned anything.
+        becomes zero. The true cause may be an obstacle, so the offset is then as uncertain as
+        before the line learned anything.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2
@@ -85,8 +85,8 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add ``slope`` and ``offset`` to the slope and the offset of the line.
 
-        The caller uses this method if it has no measurement of this motor alone. The line then
-        changes by the same amounts as the line of the other motor.
+        The caller uses this method if only the other motor was measured. The line then changes by
+        the same amounts as the line of the other motor.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

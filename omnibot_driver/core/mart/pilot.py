@@ -46,7 +46,7 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 
 VOLTS crashes a server that is starting up, and a server that was silent may have been restarted. So
 the driver does not send VOLTS earlier. It does not send VOLTS later either: it needs the voltage
-before the first motion, which begins STARTS_UP_S after the first reply.
+before the first motion, which can begin STARTS_UP_S after the first reply.
 """
 VOLTS_S: Final = 10.0
 """Time in s since the last voltage query (VOLTS) after which the next one is sent in any case.

@@ -35,7 +35,10 @@ The value applies to the time before the first heading of the drive.
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
 ACCELERATION_RADPS2: Final = 3.0
-"""Standard deviation of the angular acceleration since the last encoder count, in rad/s²."""
+"""Standard deviation of the angular acceleration since the last measurement, in rad/s².
+
+The last measurement is the last encoder count or the last heading.
+"""
 FRESH_S: Final = 0.2
 """Age of the last heading, in s, up to which the measured turn rate is valid."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
@@ -244,8 +247,8 @@ class Reckoning(CorrectedPose):
 
         As long as the start command may have been lost, the last encoder count may be from before
         the start, or it may show a motion after the start. The pose assumes that it is from before
-        the start. This property returns the motion that it otherwise shows. If there is no such
-        count, both values are zero.
+        the start. This property returns the motion that the count shows if it is from after the
+        start. If there is no such count, both values are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

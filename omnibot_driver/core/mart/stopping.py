@@ -54,12 +54,12 @@ later: before its reply, it waits 0.75 s for the robot to stop.
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
-    """Return whether a motion failed only because the wheels stopped too late.
+    """Return whether a motion failed only because the wheels did not stop in time.
 
     The motors are off after this failure. If the motion is a controlled turn, the server may report
     the failure with a wrong text: that the turn has not begun. If the turn lasted longer than
-    ``NO_START_S``, it has certainly begun. So this text then means that the wheels stopped too
-    late.
+    ``NO_START_S``, it has certainly begun. So this text then means that the wheels did not stop in
+    time.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """

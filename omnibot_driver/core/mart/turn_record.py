@@ -25,9 +25,10 @@ records show. When the sum reaches ENOUGH_RAD, it downloads no more records.
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
 UNRECORDED: Final = 3
-"""Limit for failed downloads. A download fails if it does not bring a usable record.
+"""Number of failed downloads in a row after which the driver downloads no more records.
 
-After this number of failed downloads in a row, the driver downloads no more records.
+A download fails if it brings no usable record. A cancelled download does not count. A new
+connection sets the count of failures to zero.
 """
 _HEAD: Final = re.compile(
     rb"MC Spin sensor data log\r?\n"

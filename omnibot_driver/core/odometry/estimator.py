@@ -37,8 +37,8 @@ by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
-It is the standard deviation of the turn in lost displacements. When a pose of the board has shown
-the lost motion, the heading is known again.
+Only lost displacements make the heading uncertain: the standard deviation is that of the turn in
+them. When a pose of the board has shown the lost motion, the heading is known again.
 """
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt

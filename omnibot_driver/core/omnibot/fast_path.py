@@ -95,8 +95,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, a shock of the robot has caused the unusual content, not damage. There is one exception:
-    the result is False if the bytes after the complete frame cannot begin another frame.
+    If so, a shock of the robot has caused the unusual content, not damage. The result is also False
+    if the bytes after the complete frame cannot begin another frame.
 
     ``closed``: whether no more bytes come. If ``held`` ends at ``at``, the result is ``closed``.
     """

@@ -21,7 +21,7 @@ BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
 An adapter with a timer delays reads by different times, and the delays repeat: every 20 s, if the
-timer's period is wrong by 100 ppm. So 75 s always contain the adapter's smallest delay.
+timer's period is wrong by 100 ppm. So 75 s are long enough to contain the smallest delay.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a

@@ -238,7 +238,7 @@ def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) ->
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """The odometry is reset while the robot drives to a goal, which discards the goal.
+    """The odometry is reset while the robot drives to a goal. This reset discards the goal.
 
     The driver sends the Stop frame. A velocity frame with zeros (mode 1) would be a goal at the
     origin.

@@ -21,7 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """The first ``frames`` frames of this test motion all differ. Then the last one repeats."""
+    """A test motion: its first ``frames`` frames all differ, and then the last one repeats."""
 
     authority, is_zero = Authority.BASE, False
 

@@ -116,9 +116,9 @@ def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) 
     """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
 
     The lost characters can be the line end and the semicolon at the beginning of the next line. The
-    board then reads both lines as one. If the checksum of the next line is 92, this one line begins
-    with the motion ``rc 2 0 092``, and its checksum does not show the damage. Therefore, the driver
-    sends an empty line before such a next line.
+    board then reads both lines as one. If, for example, the checksum of the next line is 92, this
+    one line begins with the motion ``rc 2 0 092``, and its checksum does not show the damage.
+    Therefore, the driver sends an empty line before such a next line.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)

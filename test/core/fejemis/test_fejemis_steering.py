@@ -192,7 +192,8 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
     """A turn on the spot begins while the front wheel points ahead. The robot does not roll away.
 
-    It waits until the front wheel has turned. Without this wait, it would roll 0.17 m.
+    The driver waits until the front wheel has turned. Without this wait, the robot would roll
+    0.17 m.
     """
     bench = nominal()
     for _ in range(12):

@@ -2,8 +2,8 @@
 
 """Tests of tick counts with encoders of few and of many ticks per turn.
 
-The limits for the counts depend on this resolution. With each resolution, the driver accepts every
-motion of a wheel, and still notices errors and restarts.
+The number of ticks per turn (the resolution) determines the limits for the counts. With each
+resolution, the driver accepts every motion of a wheel, and still notices errors and restarts.
 """
 
 import math

@@ -27,8 +27,8 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 ) -> None:
     """A wheel gets stuck during a turn to a goal. The server measures the turn only by the gyro.
 
-    The encoder of the right wheel shows another angle, so the driver discards the goal. The
-    covariance of the pose covers the difference between the two angles.
+    The encoder of the right wheel shows another angle than the gyro, so the driver discards the
+    goal. The covariance of the pose covers the difference between the two angles.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 0.0, 2.6)

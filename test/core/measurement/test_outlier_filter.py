@@ -108,7 +108,8 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
     """In one reading, the force along z and the gyro's values belong to another frame.
 
-    A robot cannot change its turn rate for a single reading, so the filter rejects the reading.
+    No robot changes its turn rate by this amount for a single reading, so the filter rejects the
+    reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()

@@ -2,9 +2,9 @@
 
 """Tests that an IMU frame is returned as soon as the packet with its last byte arrives.
 
-The tests use adapters that split the bytes into packets in different ways. The last bytes of an IMU
-frame can look like the header of another frame. The decoder then decides by the arrival times
-whether another frame has begun.
+The tests use adapters that split the bytes into packets in different ways. The last byte of an IMU
+frame can look like the beginning of another frame. The decoder then decides by the arrival times
+whether another frame may have begun.
 """
 
 from collections.abc import Callable, Iterator

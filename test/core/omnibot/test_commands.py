@@ -200,7 +200,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(max_examples=40, suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Apart from rounding, the driver computes the commanded velocity back from its frame.
+    """Apart from rounding, the velocity that is computed back from a frame is the commanded one.
 
     Rounding changes a word of the frame by up to 0.5 LSB. If the word would contain a harmful byte,
     it changes by up to 1.5 LSB.

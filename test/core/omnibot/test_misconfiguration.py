@@ -96,8 +96,8 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
     """The line loses bytes, so fewer IMU frames than usual come between two deltas.
 
-    The number of IMU frames suggests another period of the deltas. But the arrival times show that
-    ``delta_period`` is right, so there is no advice.
+    A smaller number of IMU frames can mean another period of the deltas. But the driver advises
+    another ``delta_period`` only if the arrival times confirm it, so there is no advice.
     """
     sent = sent_by(BoardSettings(running=True, delta_period_s=period_s), LONG_S)
     driver = OmniBot(OmniBotSettings(delta_period_s=period_s))
@@ -128,8 +128,8 @@ def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
 def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
     """A busy computer reads up to one second of data at once.
 
-    The deltas of one read have the same arrival time, which does not show their period. The driver
-    does not advise another period.
+    All deltas of one read have the same arrival time. Nevertheless, the driver does not advise
+    another period.
     """
     sent = sent_by(BoardSettings(running=True, delta_period_s=0.04), LONG_S)
     driver = OmniBot(OmniBotSettings())
