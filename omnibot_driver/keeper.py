@@ -56,7 +56,7 @@ class Keeper:
         self.last_words = stop, emergency_stop
         self._ahead = 0
         """Number of bytes of stop commands that the guard may not have read yet. All other unread
-        bytes are heartbeats. If too many heartbeats are unread, the guard hangs."""
+        bytes are heartbeats. If too many of them are unread, the guard is regarded as hung."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed processes that have not ended yet."""
@@ -81,7 +81,7 @@ class Keeper:
         return trouble
 
     def change(self, stop: Packets, emergency_stop: Packets) -> None:
-        """Send the guard new stop commands. Does not wait for the guard."""
+        """Send the guard new stop commands, without waiting for any process."""
         self.last_words = stop, emergency_stop
         if (process := self._process) is None:
             return
@@ -145,7 +145,8 @@ class Keeper:
     def _addressed(self, packets: Packets) -> str:
         """Return the packets as text for the guard, except packets for lines that are not open.
 
-        The text of a packet is the number of the line, and the bytes in hexadecimal.
+        The text of a packet is ``DESCRIPTOR:HEX``: the file descriptor of its line, and its bytes
+        in hexadecimal.
         """
         return ",".join(
             f"{line}:{data.hex()}"

@@ -81,7 +81,7 @@ class StallDetector:
         self._day_ns = wall_ns - round(now * 1e9)
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """Return False if a command may be from before the end of a recent stall, otherwise True.
+        """Return False if a command may have been sent before or during a recent stall, else True.
 
         ``sent_ns``: the command's time of sending, as time of day in ns. ``now``: time of
         ``boot_time_s``.

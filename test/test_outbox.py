@@ -26,7 +26,7 @@ def in_threads(*works: Callable[[], object]) -> None:
 
 
 class Held:
-    """Keeps the outbox busy: a thread delivers an event, which lasts until ``let_go`` is called."""
+    """Keeps the outbox busy: a thread delivers one event, and ends only after ``let_go``."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._begun, self._over = threading.Event(), threading.Event()
@@ -171,7 +171,7 @@ def test_a_call_that_is_put_just_before_the_end_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """The outbox is full, and a thread delivers. A second call of ``deliver`` waits for it.
+    """The outbox is full, so a thread that calls ``deliver`` waits for the thread that delivers.
 
     Without this wait, the outbox could grow without limit.
     """

@@ -134,7 +134,7 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        While the board runs, the driver still accepts commands to stand still.
+        While the board runs, commands to stand still are not refused for this reason.
         """
         return ""
 

@@ -3,8 +3,8 @@
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
 The letters S (start), P (pause) and R (reset) may be lost on the line, so the driver may have to
-repeat them. But a P that is repeated without need resumes a paused board. So the board's data and
-texts decide when a letter is repeated, and each request has a deadline.
+repeat them. But a P that is repeated without need resumes a paused board. So the driver repeats P
+only if the board still sends data. Each request has a deadline.
 
 This module does not know bytes, and reads no clock.
 """
@@ -29,8 +29,8 @@ FLOWING_S: Final = 0.1
 """Longest time, in s, that one interval between two reads can add to the time for
 ``PAUSE_RETRY_S``.
 
-A running board sends every 10 ms. A longer interval does not show that the board has sent data all
-the time. So only ``FLOWING_S`` of it is counted.
+A running board sends every 10 ms. If an interval is longer than ``FLOWING_S``, the board may not
+have sent data all the time. So only ``FLOWING_S`` of this interval is counted.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.

@@ -25,7 +25,7 @@ ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""Additional time in s that a driver may take to end: it waits while its guard repeats Stop."""
+"""Additional time in s that a driver may take to end: it may wait while its guard repeats Stop."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:

@@ -127,7 +127,7 @@ def test_the_bias_is_what_was_set_last(
     """The driver uses the gyro bias that was set last.
 
     While the robot is at rest, the driver refines the gyro bias. Then the user sets ``gyro_bias``.
-    From now on, the driver uses the user's value, even if the parameter already had this value.
+    From then on, the driver uses the user's value, even if the parameter already had this value.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))

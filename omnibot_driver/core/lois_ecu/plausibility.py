@@ -2,8 +2,8 @@
 
 """Plausibility of a complete report: its values, and their change since the last report.
 
-If two successive reports fit each other, but not the report before them, the board has restarted or
-was reset.
+If two successive reports fit each other, but not the last accepted report before them, this module
+assumes that the board has restarted or was reset.
 
 This module works on values and arrival times.
 """

@@ -32,8 +32,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: whether two points are certain: the reply answers this start command, and the
-        network is so good that no late copy of the command will arrive.
+        ``arrived``: True if two conditions hold. The reply certainly answers this start command,
+        and the network is so good that a late copy of the command is unlikely.
         """
         word = self._start
         assert word is not None
@@ -86,8 +86,8 @@ class FailedStarts(Adjusting):
 
         If the reported reason is not an obstacle, the result is True. If it is an obstacle, the
         obstacle may have ended an earlier backward drive, or it may be in front of the robot. The
-        driver assumes that it is in front, and returns False, in two cases: the front sonar detects
-        an obstacle too, or RM reports an obstacle again.
+        driver assumes that it is in front in two cases: the front sonar detects an obstacle too, or
+        RM reports an obstacle again. The result is then False.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

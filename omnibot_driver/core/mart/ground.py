@@ -40,7 +40,7 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Least time in s between the server's first reply after an absence and the start of a motion.
+"""Shortest time in s from the server's first reply after an absence to the start of a motion.
 
 The server may just have been started. While it starts up, VOLTS and most motion commands crash it.
 If RM (forward drive) crashes it, the motors stay on after the crash.
@@ -75,7 +75,7 @@ GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
 A server that executes the move does not answer HELLO. So if it answers, the move is over and its
-reply was lost, or the server was restarted.
+reply is late or lost, or the server was restarted.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.

@@ -208,7 +208,7 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        The server may have reported shortly before that RM (forward drive) failed. Then RM has
+        The server may have reported shortly before that RM (forward drive) failed. If so, RM has
         started the motors in spite of this report, and the server is regarded as defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S

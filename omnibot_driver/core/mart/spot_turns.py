@@ -68,11 +68,11 @@ rate.
 smaller turns, the angle that the wheel measured is used.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Terms of the limit above which a number in a reply may be an encoder count instead of an angle.
+"""Terms of the limit by which the driver checks the number in the reply to a stop command.
 
-The reply answers a stop command, and should contain the angle of the turn. The driver compares the
-number with the expected turn. The limit for their difference is UNSURE_RAD (rad), plus UNSURE_PART
-times the expected turn, plus the angle by which the robot turns during two queries.
+The number should be the angle of the turn. If it differs from the expected turn by more than the
+limit, it may be an encoder count instead. The limit is UNSURE_RAD (rad), plus UNSURE_PART times the
+expected turn, plus the angle by which the robot turns during two queries.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.

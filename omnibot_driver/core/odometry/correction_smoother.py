@@ -52,9 +52,9 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` as far as the limits for it allow.
+        """Move ``target`` by a displacement, and ``pose`` by the part of it that is allowed.
 
-        ``room_m``, ``room_rad``: these limits, which are a distance and an angle.
+        ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)

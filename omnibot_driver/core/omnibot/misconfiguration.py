@@ -17,7 +17,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
 """Number of poses that prove a setting wrong if they contradict it, and if no pose between them
-confirms it. They take at least 2 s."""
+confirms it. The board sends this number of poses in 2 s."""
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
 """``SMALLEST``, ``LARGEST``: limits of a coordinate other than 0, in mm or mrad.

@@ -35,9 +35,9 @@ zeros wake a board. Three zeros are enough for this.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-The previous frame may have lost its end. Then the zeros complete it, and the board may obey a wrong
-command. The motion frame replaces this command. It follows sooner after four zeros than after the
-eight of ``ZEROS``.
+The previous frame may have lost its end. Then the zeros may complete it, and the board obeys a
+wrong command until the motion frame replaces this command. The motion frame follows sooner after
+four zeros than after the eight of ``ZEROS``.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

@@ -38,7 +38,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """The motion monitor has stopped the robot. A pause of the commands ends the refusal of motion.
+    """The motion monitor has stopped the robot. A pause in the commands ends the refusal of motion.
 
     The pause must be as long as the command timeout. It is counted from the last command, not from
     the stop.

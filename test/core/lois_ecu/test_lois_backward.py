@@ -63,9 +63,9 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """The odometry detects that a wheel was at rest before the driver started it again.
 
-    The board keeps reporting 12 RPM for this wheel. Then the driver commands 7 RPM backward. A
-    rolling wheel would now slow down from 12 RPM. This wheel does not slow down, so it was at rest
-    before. The odometry adds no distance for the time before the start.
+    The driver commands 7 RPM backward, but the board keeps reporting 12 RPM for this wheel. The
+    reported speed of a rolling wheel would fall to 7 RPM. So this wheel is at rest, and the
+    odometry takes back the distance that it has added since the reported speed last changed.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)

@@ -28,7 +28,7 @@ def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
-    """The robot drives forward by duty. The odometry is right, although no ticks are counted.
+    """The robot drives forward by duty. The odometry shows this, although no ticks are counted.
 
     After the board's start, the public firmware counts no ticks in such a drive, and the board's
     own odometry (0x20) does not change. The driver does not conclude from this that the robot is at

@@ -52,7 +52,7 @@ def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows()
 
 
 def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
-    """A read is 5 s late. Its reports are from the first second: then, the buffer was full."""
+    """A read is 5 s late. Its reports are from the first second. Then the buffer was full."""
     late_reads = listening()
     found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
     assert found[:-1] == about(2.0, 2.2, 2.4, 2.6)

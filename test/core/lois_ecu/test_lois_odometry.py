@@ -297,8 +297,8 @@ def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
 ) -> None:
     """With the board's own gains, a wheel's speed may oscillate between two reports.
 
-    The sign of such an oscillation is a report with more ticks than expected. After such a report,
-    the odometry increases the variance of the speeds that it predicts.
+    A report with more ticks than expected is a sign of this. After such a report, the odometry
+    increases the variance of the speeds that it predicts.
     """
 
     def variance() -> float:

@@ -144,7 +144,7 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """A busy computer reads three reports every 0.4 s. The reports are late, but none is lost.
+    """Every 0.4 s, a busy computer reads three reports at once. They are late, but none is lost.
 
     So no fall of the speed was missed. The constant speed therefore shows that the wheel rolls.
     """

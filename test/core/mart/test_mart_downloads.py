@@ -141,8 +141,8 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
     """The log can be downloaded after a straight drive.
 
-    A server that was restarted has lost its log, and its heading is exactly zero. After a straight
-    drive, the heading is often exactly zero, too. The driver does not mistake this for a restart.
+    A server that was restarted has lost its log, and its heading begins at zero. But after a
+    straight drive, the heading is often zero, too. The driver does not mistake this for a restart.
     """
     for seed in range(3):
         bench = MartBench(firmware, seed=seed).ready()

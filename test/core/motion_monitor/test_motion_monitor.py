@@ -203,7 +203,7 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """A robot does not obey a motion command. The monitor returns a fault each second.
+    """A robot does not move in spite of a command. The monitor returns a fault each second.
 
     The caller must filter out the repetitions. After a release of the e-stop, the monitor returns a
     different fault: the board may still be in its own emergency stop.
@@ -220,8 +220,8 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
     """A robot that was held may then drive too fast, until it has made up for the lost distance.
 
-    The robot should drive at 0.4 m/s. It is held for 1 s, so it falls 0.4 m behind. When it has
-    made up for this distance and still drives too fast, this is a fault.
+    The robot should drive at 0.4 m/s. It is held for 1 s, so it falls 0.4 m behind. After it has
+    made up for this distance, too high a speed is a fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
