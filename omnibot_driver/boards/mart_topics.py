@@ -154,6 +154,8 @@ class MartTopics:
                 return ESTOP
             if not board.resting:
                 return NOT_AT_REST
+            if job is Job.DOCK and (why := session.interlocks.why_not_move_by_itself(now)):
+                return str(why)
             try:
                 board.ask(job, answer, now, *arguments)
             except RequestRefused as error:

@@ -139,6 +139,11 @@ class Board(Protocol):
         return ""
 
     @property
+    def own_motion(self) -> str:
+        """Name of a motion that a service has begun, e.g. "docking"; empty if there is none."""
+        return ""
+
+    @property
     def reset_refusal(self) -> str:
         """Reason why a requested reset is refused, with a remedy; empty if a reset is allowed."""
         return ""

@@ -84,6 +84,13 @@ class Interlocks:
             return refusal
         return tripped
 
+    def why_not_move_by_itself(self, now: float) -> str:
+        """Return why a service must not move the robot, e.g. to dock it; empty if it may.
+
+        The motion monitor's refusal holds for such a motion, as for motion commands.
+        """
+        return self._interlock.reason(now, self._policy.settings.timeout_s)
+
     def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 

@@ -277,18 +277,20 @@ class CommandPipeline:
         ]
 
     def end_goal(self, now: float) -> list[str]:
-        """Drop the goal, because a zero ``cmd_vel`` has arrived; return notices for the user.
+        """Drop the goal or the docking, because of a zero ``cmd_vel``; return notices for the user.
 
-        The zero ``cmd_vel`` was refused, but it still ends the goal. There is one exception: the
+        The zero ``cmd_vel`` was refused, but it still ends this motion. There is one exception: the
         goal stays if the board's control switch does not permit velocities at all.
         """
-        current = self.policy.current
-        if not isinstance(current, GoalSetpoint) or not self.shaper.takes_velocities:
+        goal = isinstance(self.policy.current, GoalSetpoint)
+        motion = "goal" if goal else self._board.own_motion
+        if not motion or not self.shaper.takes_velocities:
             return []
         self.policy.halt(now)
+        ended = "the goal of cmd_pose is discarded" if goal else f"the {motion} is cancelled"
         return [
-            "the goal of cmd_pose is discarded: cmd_vel commanded the robot to stand still; this"
-            " command was refused, but it still ends the goal"
+            f"{ended}: cmd_vel commanded the robot to stand still; this command was refused, but it"
+            f" still ends the {motion}"
         ]
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:

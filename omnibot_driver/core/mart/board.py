@@ -91,6 +91,11 @@ class MartBoard(Board):
         return self._mode
 
     @property
+    def own_motion(self) -> str:
+        """The name of the docking job from its request to its end; empty at other times."""
+        return Job.DOCK.value if self._pilot.jobs.job is Job.DOCK else ""
+
+    @property
     def figures(self) -> BoardFigures:
         """The counters and states for diagnostics."""
         pilot = self._pilot

@@ -132,3 +132,19 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
     (done,) = bench.extras(JobDone)
     assert not done.success
     assert "port" in done.message
+
+
+def test_a_refused_zero_command_ends_a_docking() -> None:
+    """A zero cmd_vel arrives during a docking, but is refused, e.g. because its stamp is too old.
+
+    The driver still ends the docking, because it has no ``cmd_vel_timeout``.
+    """
+    bench = MartBench().ready()
+    bench.board.ask(Job.DOCK, "token", bench.now, "DOCK", 80)
+    bench.run_until(lambda: not bench.robot.stands)
+    bench.session.end_goal(bench.now)
+    bench.run(1.5)
+    assert bench.robot.stands
+    assert b"SL" in bench.said()
+    assert bench.board._pilot.jobs.job is None
+    assert "the docking is cancelled: cmd_vel" in bench.notices[-1]

@@ -72,6 +72,19 @@ class Mart:
         self.wait_for(stood)
         assert not self.do(lambda board: board.server.hung)
 
+    def answer_at_rest(self, probe: Probe, service: str) -> Any:
+        """Call the service once a second until the driver knows that the robot is at rest.
+
+        Return the last answer.
+        """
+        for _ in range(round(PATIENCE_S)):
+            done = probe.call(Trigger, service)
+            if "no proof that the robot is at rest" not in done.message:
+                break
+            later = self.do(lambda board: board.ticks) + SECOND_TICKS
+            self.wait_for(lambda board, later=later: board.ticks > later)
+        return done
+
     def answer(self, probe: Probe, service: str) -> Any:
         """Call the service once a second, as long as the driver refuses it.
 
@@ -245,6 +258,52 @@ def test_a_zero_with_an_old_stamp_ends_a_goal(
     zeros.publish(zero)
     driver.wait_for_line("goal of cmd_pose is discarded: cmd_vel commanded")
     mart.stands_for_good()
+
+
+def test_a_zero_with_an_old_stamp_ends_a_docking(
+    stack: ExitStack, start_driver: Start, probe_of: Start
+) -> None:
+    """The robot drives to the dock. Then a zero TwistStamped arrives, whose stamp is 600 s old.
+
+    The driver refuses the command, but stops the robot. ``~/dock`` fails.
+    """
+    mart = mart_of(stack)
+    driver: Driver = start_driver(
+        mart.url, board="mart", enable_stamped_cmd_vel=True, dock_distance=3.0
+    )
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    zeros = probe.publisher(TwistStamped, "cmd_vel")
+    assert mart.answer(probe, "calibrate_gyro").success  # so the robot is known to be at rest
+    docking = probe.call_async(Trigger, "dock")
+    mart.wait_for(lambda board: board.server.chassis.moving)
+    zero = TwistStamped()
+    zero.header.stamp = (probe.node.get_clock().now() - Duration(seconds=600)).to_msg()
+    zeros.publish(zero)
+    driver.wait_for_line("the docking is cancelled: cmd_vel commanded")
+    assert not docking.wait().success
+    mart.stands_for_good()
+
+
+def test_a_robot_that_the_motion_monitor_has_stopped_does_not_dock(
+    stack: ExitStack, start_driver: Start, probe_of: Start
+) -> None:
+    """The motion monitor stops the robot twice, because ``encoder_inverted`` is wrong.
+
+    The driver then refuses motion until the e-stop is latched and released. So it refuses to dock.
+    """
+    mart = mart_of(stack)
+    driver: Driver = start_driver(mart.url, board="mart", encoder_inverted=True)
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    for stop in ("until you send a zero command", "until the e-stop is latched and released"):
+        with driven(probe, mart, 0.3, 0.0):
+            driver.wait_for_line(f"wrong direction.*{stop}")
+        mart.stands_for_good()
+    done = mart.answer_at_rest(probe, "dock")
+    assert not done.success
+    assert "the motion monitor has stopped the robot twice" in done.message
+    assert not mart.do(lambda board: board.server.moving)
 
 
 def test_a_driver_that_hangs_is_guarded(new: New) -> None:
