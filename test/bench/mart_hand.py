@@ -17,8 +17,8 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Speeds in m/s that are commanded in this order, again and again. The list ends with two zeros. In
-this time the robot comes to rest, so that it can be started again."""
+"""Speeds in m/s that are commanded in this order, again and again. During the two zeros at
+the end of the list, the robot comes to rest, so that it can be started again."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 

@@ -63,9 +63,9 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 @pytest.mark.slow
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """Odometry arrives rarely. Nevertheless, all commands are accepted.
+    """The user sends fifty commands at 20 Hz.
 
-    The user sends fifty commands at 20 Hz.
+    All of them are accepted, even on a board whose odometry arrives rarely.
     """
     for _ in range(50):
         bench.drive(0.2)

@@ -237,7 +237,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """SIGSTOP suspends the monitor, which has no time to restore the terminal before that.
+    """SIGSTOP suspends the monitor at once, so the monitor cannot restore the terminal first.
 
     After the suspension, the monitor draws its screen again. Then the user presses q. The monitor
     restores the terminal and ends.

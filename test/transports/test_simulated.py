@@ -60,8 +60,8 @@ def test_a_read_ends_without_a_packet() -> None:
 def test_a_read_that_waits_can_be_interrupted() -> None:
     """A read waits for data, and another thread interrupts it. The read returns without data.
 
-    Closing a transport must interrupt a waiting read. Otherwise, closing would last until the board
-    sends data, and a paused board seldom sends data.
+    Closing a transport must interrupt a waiting read. Otherwise, the read of a paused board would
+    often last until its time limit, because a paused board seldom sends data.
     """
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)

@@ -25,8 +25,8 @@ ACROSS: Final = 10.0
 """Limit in degrees for an angle that the board misreads.
 
 Damage on the line can remove the minus sign of an angle, and the checksum may not detect this. The
-board then reads an angle to the right as an angle to the left. The driver writes each angle such
-that a misread angle is smaller than this limit.
+board then reads an angle to the right as an angle to the left. The driver writes each angle in
+such a way that a misread angle is smaller than this limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

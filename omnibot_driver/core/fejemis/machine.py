@@ -2,8 +2,9 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-The board does not acknowledge these lines, so they are repeated. The lines that move the lift are
-an exception: each of them limits the lift's run time.
+The board does not acknowledge these lines, so they are repeated. There is one exception: the line
+of a lift command is sent only once. If it is a command of 0 V and its line is lost, the lift still
+stops, because each line that moves the lift limits its run time.
 """
 
 import math

@@ -32,10 +32,11 @@ AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """Tolerance in s within which implausible board times must agree to begin the clock anew.
 
-``AGAIN`` such times in a row begin the clock anew. Two conditions must hold. From the first time to
-each of the others, the board time advances as much as the arrival time, within this tolerance. The
-last time arrives at least ``AGAIN_AFTER_S`` s after the first. The times of lines that seem early
-must agree within the same tolerance.
+At least ``AGAIN`` such times in a row begin the clock anew if two conditions hold. From the first
+time to each of the others, the board time advances as much as the arrival time, within this
+tolerance. The last time arrives at least ``AGAIN_AFTER_S`` s after the first.
+
+The times of lines that seem early must agree within the same tolerance.
 """
 EARLIES_WITHIN_S: Final = 1.0
 """Longest time in s for which a line that seems early is counted together with later such lines.

@@ -48,9 +48,9 @@ UNFORESEEN_TICKS: Final = 1.5
 """Limit, in ticks, of the difference between a reported and an expected count. Above this limit,
 the wheel does not keep its speed, so the filter allows for larger changes of the speed."""
 UNFORESEEN: Final = 5.0
-"""Limit, in standard deviations, of the same difference, to detect a restart of the board. No
-motion of the wheel explains a larger difference. If the counts are near zero too, the board has
-restarted."""
+"""Limit, in standard deviations, of the difference between a reported and an expected count. A
+motion of the wheel cannot explain a larger difference. The difference is a sign of a restart of the
+board only if the counts are near zero and the clock is irregular."""
 SAME_TICKS: Final = 0.6
 """An unchanged count corrects the filter only if the expected count differs from it by at least
 this number of ticks. With a smaller difference, the next tick may not be due yet."""
@@ -82,8 +82,8 @@ LATE_PART: Final = 0.6
 distance that the wheel rolls during the delay. Only a wheel without counted ticks has this error.
 """
 EQUAL_RPM: Final = 3.0
-"""Standard deviation, in RPM, of the measurement that both wheels have the same speed. The filter
-uses this measurement when the board's odometry shows equal speeds."""
+"""Standard deviation, in RPM, of the difference between the true speeds of the two wheels when the
+board's odometry shows equal speeds."""
 
 
 class Comparison:

@@ -21,13 +21,13 @@ SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
 """Motor units of controlled moves at normal speed, which are sent without the word SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""From ``ENOUGH_MOVES`` moves on, a distance of ``ENOUGH_M`` (in m) from the goal is accepted.
+"""After ``ENOUGH_MOVES`` moves, a distance of up to ``ENOUGH_M`` (in m) from the goal is accepted.
 
-Before, the distance must be smaller (``NEAR_M``). To come nearer than ``ENOUGH_M``, the robot would
-need another turn and another straight move.
+Until then, the distance must be at most ``NEAR_M``, which is smaller. To come nearer than
+``ENOUGH_M``, the robot would need another turn and another straight move.
 """
 STRETCH: Final = 1.3
-"""Assumed ratio of driven to requested length of a straight move, until such a move was measured.
+"""Assumed ratio of driven to requested length of a straight move, until one has been measured.
 
 For example, the robot drives 15.8 inches if 12 inches are requested, a ratio of 1.32.
 """
@@ -44,8 +44,8 @@ WIDER: Final = 0.5
 """Factor by which the allowed heading error increases with each turn since the last straight move.
 
 After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. A turn may go too
-far, and the turn back may go too far again. The increase prevents that the robot turns back and
-forth.
+far, and the turn back may go too far again. The increase prevents the robot from turning back
+and forth.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.

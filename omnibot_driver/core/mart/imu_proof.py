@@ -27,8 +27,8 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, the network has delayed its command, its reply, or both. The driver assumes
-that the reply had half of the delay. The result is older by this half when it arrives.
+If a check takes longer, the driver assumes that the network has delayed it, and that half of the
+delay came after the check. So the result is already older by this half when it arrives.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""

@@ -160,8 +160,8 @@ class SpeedLoop(Motors):
         ``units``: the units that both motors have; None for the current units of each motor.
 
         The driver learns from this that these units are not enough to turn the motor. It does not
-        learn from a motor with MOST_DEAD units or more: such a motor is blocked, because these
-        units are enough.
+        learn from a motor with MOST_DEAD units or more: these units are enough for every motor, so
+        such a motor is regarded as blocked.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

@@ -19,8 +19,8 @@ BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
 with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
 
-After a loss of displacements, both limits are larger: the driver adds the motion that the lost
-displacements may contain. The next accepted pose shows this motion, and ends the addition.
+After a loss of displacements, the driver adds the motion that they may contain to both limits. The
+next accepted pose includes this motion, so the limits then have their usual values again.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -33,8 +33,8 @@ class PoseGate:
     """Decides which poses of the board are accepted.
 
     * ``proved``: the last accepted pose; None if there is none that is still valid.
-    * ``doubted``: the last unexpected pose, moved on by each later motion of the robot. The next
-      pose must confirm it. None if there is no such pose.
+    * ``doubted``: the last unexpected pose, plus each later motion of the robot. The next pose
+      must confirm it. None if there is no such pose.
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class PoseGate:
             self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Move the unconfirmed pose ``doubted`` on by the robot's motion during a gap.
+        """Add the robot's motion during a gap to the unconfirmed pose ``doubted``.
 
         ``chord``: the assumed motion during the gap, in the axes of ``doubted``.
         """

@@ -18,8 +18,8 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time. Each stamp is later than the stamp before it.
 
-    If two reads come at almost the same time, their stamps could be equal. So the stamps of the
-    second read can be a little later than its arrival time.
+    If a read comes almost at the same time as the read before it, its stamps can be a little later
+    than its arrival time. In all other cases, no stamp is later than the arrival time.
     """
 
     skew_ppm = 0.0

@@ -119,8 +119,8 @@ class Encoder:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
         An edge has three values. The first is its time, as a fraction of the step. The second is
-        True if a long level ended at this edge. The third is the direction of the
-        disc: 1 forward, -1 backward.
+        True if a long level ended at this edge. The third is the direction of the disc: 1 forward,
+        -1 backward.
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn

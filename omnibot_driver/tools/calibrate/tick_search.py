@@ -52,9 +52,9 @@ The load changes slowly. Therefore residuals are correlated even at this distanc
 MISSED: Final = 0.42
 """Limit for the sum of the relative errors of two successive times between ticks.
 
-If the sum is larger, the board has missed the mark at the end of the earlier time. The earlier time
-then covers two distances between marks, so it is twice as long as expected. Its relative error is
-1, and the sum is about 1. The board's clock can lose up to 6 ms, which makes the sum smaller.
+If the sum is larger, the board has missed a mark within the earlier time. The earlier time then
+covers two distances between marks, so it is twice as long as expected. Its relative error is 1, and
+the sum is about 1. The board's clock can lose up to 6 ms, which makes the sum smaller.
 
 The board may also notice a mark late. Then the earlier time is too long, and the later one is too
 short. The sum is near 0, which is below the limit.
@@ -206,8 +206,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals, and remove it in all later searches.
 
-        The residuals are correlated for two reasons. The marks have uneven distances, until they
-        are fitted. The load changes slowly, also after the fit.
+        The residuals are correlated for two reasons: the marks have uneven distances, and the load
+        changes slowly. After the marks are fitted, only the load causes the correlation.
 
         ``values``: the values of the plant for which the residuals are computed.
         """

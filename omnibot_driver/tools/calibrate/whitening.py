@@ -18,7 +18,7 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
     If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0: independent errors
-    have a correlation of 0, and displaced encoder marks have one of -0.5. If ``lags`` is larger,
+    have a correlation of 0, and displaced encoder marks cause one of -0.5. If ``lags`` is larger,
     each value is multiplied by a factor that decreases with the lag.
 
     ``rows``: rows of successive residuals.

@@ -75,8 +75,8 @@ class World(NamedTuple):
 
 
 Rules = Callable[[State, str, Motion], bool]
-"""A function that returns whether the driver's table of commands allows a command. Its arguments
-are the state of the driver, the command, and the motion of the robot."""
+"""A function that returns whether a command is allowed, like the driver's table of commands. Its
+arguments are the state of the driver, the command, and the motion of the robot."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
 """A function that returns all commands that the table of commands allows. Its arguments are the
 state of the driver, and the motion of the robot."""
@@ -155,8 +155,8 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the steps in which a controlled move ends.
 
-    If a late copy of a move has arrived during the move, there are two possible steps: the server
-    forgets the copy, or it executes the copy after the move.
+    A late copy of a move may have arrived during the move. Then there are two possibilities: the
+    copy has no effect, or the server executes it after the move.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)

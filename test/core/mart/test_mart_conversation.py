@@ -296,8 +296,8 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
     """During a motion, a smaller encoder count arrives after a larger one.
 
-    The count never falls in such a motion, so the network has delayed or duplicated the smaller
-    count. It does not change the pose.
+    The driver concludes that the network has delayed or duplicated the smaller count. So this count
+    does not change the pose.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -340,10 +340,10 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """The server may report at once that the check of the IMU has failed, for example without IMU.
+    """The check of the IMU may fail at once, for example because the robot has no IMU.
 
-    So the driver accepts an early failure. It does not accept an early
-    ``ok``, because a successful check takes some time.
+    So the driver accepts an early failure. It does not accept an early ``ok``, because a successful
+    check takes some time.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

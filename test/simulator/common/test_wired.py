@@ -70,7 +70,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """The arrival time of a late datagram is by the caller's clock, not by the board's clock.
+    """The arrival time of a late datagram is a time of the caller's clock, not of the board's.
 
     The caller sends a datagram at 1000 s of its own clock. The network delays the datagram by up to
     1 s. The board's own clock shows a different time.

@@ -204,7 +204,7 @@ def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() 
     """SL on the stop port comes while a controlled move still measures the gyro's bias.
 
     If SL comes 0.03 s after the start, the server ignores it and completes the move. If SL comes
-    0.1 s after the start, the robot still moves, and the move ends only about 0.85 s after SL.
+    0.1 s after the start, the robot drives on, and the move ends only about 0.85 s after SL.
     """
     rig = Rig()
     rig.say("TF 24")
