@@ -40,14 +40,17 @@ class Upkeep:
     def configure(self, settings: LoisEcuSettings) -> None:
         """Use new settings. Changed settings are written to the board.
 
-        The robot is first stopped if the drive mode changes, if the duty scale changes in duty
-        mode, or if a sensor's terminal mode is requested.
+        The robot is first stopped if the drive mode changes, or if a sensor's terminal mode is
+        requested. In duty mode, it is also stopped if the duty scale changes, or if ``max_duty``
+        becomes lower.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
             self.change.stop_first("drive_mode", settings.drive_mode)
         elif settings.drive_mode == "duty" and settings.duty_scale != before.duty_scale:
             self.change.stop_first("duty_scale", f"{settings.duty_scale:g}")
+        elif settings.drive_mode == "duty" and settings.max_duty < before.max_duty:
+            self.change.stop_first("max_duty", f"{settings.max_duty}")
         if settings.terminal_mode is not before.terminal_mode:
             self.change.want(settings.terminal_mode)
         if _written(settings) != _written(before):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes of the drive mode and of the duty scale of a LOIS ECU, during a drive.
+"""Changes of the drive mode, the duty scale and the largest duty of a LOIS ECU, during a drive.
 
 Before such a change, the driver stops the robot and refuses motion.
 """
@@ -51,6 +51,25 @@ def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -
     assert bench.robot.way_m < before_m - 0.1
     assert before.way_to(bench.odometry[-1].pose).x_m < -0.1
     assert not [notice for notice in bench.notices if "motion monitor" in notice]
+
+
+def test_a_lower_max_duty_stops_a_robot_that_is_driven_by_duties() -> None:
+    """``max_duty`` is lowered while the robot is driven by duties, so the robot is stopped.
+
+    The command that was given before does not move the robot again, also with a higher
+    ``max_duty``.
+    """
+    bench = Bench("firmware", LoisEcuSettings(drive_mode="duty", max_duty=60))
+    bench.drive_on(0.3, 3.0)
+    configure(bench, LoisEcuSettings(drive_mode="duty", max_duty=10))
+    with pytest.raises(CommandRefused, match="max_duty is changing to 10"):
+        bench.drive()
+    bench.run_until(lambda: bench.robot.stands)
+    configure(bench, LoisEcuSettings(drive_mode="duty", max_duty=60))
+    bench.run(1.0)
+    assert bench.robot.stands
+    bench.drive_on(0.3, 1.0)
+    assert not bench.robot.stands
 
 
 def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
