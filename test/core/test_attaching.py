@@ -44,6 +44,30 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
     assert not odometry.heading_assumed
 
 
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("turn", [0.0, 0.02, -0.08])
+@pytest.mark.parametrize("lost", [(6,), (5, 6), (2,), (1, 3, 6)])
+def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
+    lost: tuple[int, ...], turn: float, frame: str
+) -> None:
+    """The driver attaches to a moving robot, and displacements are lost before two poses agree.
+
+    The odometry interpolates these displacements. The poses after it agree with the odometry, so
+    they do not move it.
+    """
+    odometry, trip, missing, estimates = Odometry(SETTINGS), Trip(0.7), 0, []
+    for number in range(60):
+        reading = trip.move(0.02, 0.004, turn, frame)
+        if number in lost:
+            missing += 1
+        else:
+            estimates += odometry.displace(replace(reading, lost=missing), number * PERIOD_S)
+            missing = 0
+        if number % 5 == 4:
+            estimates += odometry.settle(trip.pose)
+    assert last(estimates) == close(trip.truth, 1e-6)
+
+
 def test_the_first_pose_must_be_confirmed_too() -> None:
     """The board's first pose is damaged.
 

@@ -255,7 +255,7 @@ class Odometry:
             return False
         gap = self._track.uncertainty.gap
         anew = self._restarted.way_to(told)
-        went_on = self._board.way_to(self._backlog.before(told))
+        went_on = self._board.way_to(self._before_waiting(told))
         if expected(anew, gap) and _size(anew) < _size(went_on):
             return True
         if expected(went_on, gap) or (confirmed and self._reachable(told)):
@@ -264,7 +264,7 @@ class Odometry:
 
     def _attach(self, told: Pose) -> list[OdometryEstimate]:
         """Adopt a new frame of the board. The odometry continues from its current pose."""
-        self._begin_at(self._backlog.before(told))
+        self._begin_at(self._before_waiting(told))
         estimates = self._release()
         self._belief.believe(told)
         self._track.uncertainty.give_up()
@@ -280,11 +280,11 @@ class Odometry:
         """
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s) if self._backlog else lost_s
-        way = log_of(self._board.way_to(self._backlog.before(told)))
+        self._backlog.forget_losses()
+        way = log_of(self._board.way_to(self._before_waiting(told)))
         self._board = self._board.moved(roll(way))
         self._track.resume(way)
         self._move(Pose(), seconds, seconds)
-        self._backlog.forget_losses()
         estimates = self._release()
         self._track.uncertainty.settle()
         self._belief.believe(told)
@@ -298,6 +298,25 @@ class Odometry:
             self.heading_assumed = True
             self._begin_at(Pose())
         self._belief.proved = None
+
+    def _before_waiting(self, told: Pose) -> Pose:
+        """Return the pose before all displacements that wait for a pose.
+
+        From this pose, ``_release`` moves ``_board`` exactly to ``told``. It adds the waiting
+        displacements, and an interpolated motion for each displacement lost between them.
+        """
+        start = self._backlog.before(told)
+        readings = self._backlog.readings
+        if not any(reading.lost for reading in readings):
+            return start
+        for _ in range(2):  # the first pass finds the heading, and the second the place
+            gaps, end = GapInterpolation(), start
+            gaps.last = self._bridge.last
+            for reading in readings:
+                lost_way, _ = gaps.tangents(reading, end.yaw_rad)
+                end = advanced(end.moved(roll(lost_way)), reading)
+            start += told - end
+        return start
 
     def _begin_at(self, board: Pose) -> None:
         self.alignments += 1

@@ -85,8 +85,13 @@ class PendingDisplacements:
             return 0.0
         return min(unheard_s, max(0.0, stamp_s - last_stamp_s - reading.duration_s))
 
+    @property
+    def readings(self) -> list[DisplacementReading]:
+        """All displacements that wait, in order of arrival."""
+        return [reading for reading, _ in self._waiting]
+
     def before(self, board: Pose) -> Pose:
-        """Return the pose before all displacements that wait here.
+        """Return the pose before all displacements that wait here, as if none had been lost.
 
         ``board``: the pose after all these displacements.
         """
