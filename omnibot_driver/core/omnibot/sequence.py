@@ -95,7 +95,7 @@ class Sequence:
 
     def reconnect(self) -> None:
         """Begin a new connection: the board may have restarted in the meantime."""
-        self._reconnected, self._pose = True, None
+        self._reconnected = True
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """Return what the counter of a new delta shows about lost deltas and about a restart.

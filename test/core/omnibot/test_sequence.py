@@ -204,6 +204,37 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
     assert sequence.pose(0, after_s + 0.16).restarted
 
 
+def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
+    """The port is closed and opened again, and the board has restarted in the meantime.
+
+    By chance, its count 0 fits the last count and the elapsed time. The counter of the next pose
+    shows the restart, as it does while the port stays open.
+    """
+    sequence = Sequence()
+    for count in range(206):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    sequence.reconnect()
+    after_s = 205 * 0.04 + 2.0
+    for count in range(5):
+        sequence.delta(count, after_s + count * 0.04)
+    assert sequence.pose(0, after_s + 0.16).restarted
+
+
+@pytest.mark.parametrize("lost", [1, 7, 60, 255, 256, 1280, 1500])
+def test_the_pose_counter_goes_on_while_the_port_is_closed(lost: int) -> None:
+    """The port is closed for a while and the board goes on: no pose shows a restart."""
+    sequence = Sequence()
+    counts = [*range(206), *range(206 + lost, 300 + lost)]
+    for count in counts:
+        if count == 206 + lost:
+            sequence.reconnect()
+        assert not sequence.delta(count % 256, count * 0.04).restarted
+        if count % 5 == 4:
+            assert not sequence.pose(count // 5 % 256, count * 0.04).restarted
+
+
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
     """The board sends a pose after every second delta, not after every fifth.
 
