@@ -68,6 +68,23 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
     assert last(estimates) == close(trip.truth, 1e-6)
 
 
+def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
+    """A damaged pose is 15 mm and 0.04 rad off, and its count is wrong.
+
+    So the count of the next pose seems to begin anew. This pose undoes the error, because it lies
+    where the odometry expects it.
+    """
+    odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
+    for number in range(30):
+        estimates += odometry.displace(trip.move(0.01, 0.0, 0.0), number * PERIOD_S)
+        if number % 5 == 4:
+            pose = trip.pose
+            if number == 14:
+                pose = replace(pose, y_m=pose.y_m + 0.015, yaw_rad=pose.yaw_rad + 0.04)
+            estimates += odometry.settle(replace(pose, restarted=number == 19))
+    assert last(estimates) == close(trip.truth, 1e-3)
+
+
 def test_the_first_pose_must_be_confirmed_too() -> None:
     """The board's first pose is damaged.
 

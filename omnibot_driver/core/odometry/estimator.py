@@ -187,7 +187,8 @@ class Odometry:
         if not self._belief.possible(told):
             return []
         confirmed = self._belief.confirmed(told, self._track.uncertainty.gap)
-        if reading.restarted or self._is_new_frame(told, confirmed):
+        restarted = reading.restarted and not self._continues(told)
+        if restarted or self._is_new_frame(told, confirmed):
             return self._attach(told)
         if self._board is None or self._restarted is not None:
             self._belief.doubted = told
@@ -231,6 +232,15 @@ class Odometry:
         return self._settings.use_board_pose and self._belief.proved is not None
 
     # The board's frame
+
+    def _continues(self, told: Pose) -> bool:
+        """Return whether a pose is so near to the expected place that a restart changes nothing.
+
+        The counter of a pose seems to begin anew also if the pose before it was damaged.
+        """
+        if self._board is None or self._restarted is not None or self._backlog:
+            return False
+        return expected(self._board.way_to(told), self._track.uncertainty.gap)
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the odometry must adopt the board's frame in which this pose is given.
