@@ -66,7 +66,7 @@ def test_a_lower_max_duty_stops_a_robot_that_is_driven_by_duties() -> None:
         bench.drive()
     bench.run_until(lambda: bench.robot.stands)
     configure(bench, LoisEcuSettings(drive_mode="duty", max_duty=60))
-    bench.run(1.0)
+    bench.run(2.0)
     assert bench.robot.stands
     bench.drive_on(0.3, 1.0)
     assert not bench.robot.stands
