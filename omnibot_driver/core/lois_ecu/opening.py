@@ -112,9 +112,11 @@ class SettingsWriter:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
         It must wait if the robot drives, and ``ROUNDS`` rounds have already been written. More
-        rounds would disturb the drive, because a written gain resets the controller of a wheel.
+        rounds would disturb the drive, because a written gain resets the controller of a wheel. But
+        a round that has begun is completed: the terminal mode at its beginning overwrites the left
+        short correction, which follows in the same round.
         """
-        return self._points.driving and self._rounds >= ROUNDS
+        return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
     @property
     def _others_at(self) -> float:
@@ -208,7 +210,18 @@ class SettingsWriter:
         if now >= self._settings_at:
             self._begin_round(now)
             found += _taken(self._queue, now)
-        return outbound.lines(*found, with_sum=self.settings.with_sum)
+        return b"".join(map(self._encoded, found))
+
+    def _encoded(self, command: Command) -> bytes:
+        """Return the line of ``command``. Return both forms of a mode that is not confirmed.
+
+        A board that has just booted verifies checksums. So it obeys only a line with a checksum,
+        also if this line tells it to expect no checksums from now on.
+        """
+        line = outbound.lines(command, with_sum=self.settings.with_sum)
+        if isinstance(command, SetTerminalMode) and not self.confirmed:
+            return encode_command(command, with_sum=True) + line
+        return line
 
     def _begin_round(self, now: float) -> None:
         """Queue all settings for the next round.

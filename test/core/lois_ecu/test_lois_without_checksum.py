@@ -1,0 +1,51 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of a LOIS ECU that the user wants to drive without checksums (``checksum: false``)."""
+
+from dataclasses import replace
+
+import pytest
+from lois_bench import FIRMWARE, Bench
+from lois_drives import HOST_GAINS, Rig, nominal
+
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+BOOT_SHORT_CORRECTION = 1.0761719
+
+
+@pytest.mark.slow
+@FIRMWARE
+def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
+    firmware: str,
+) -> None:
+    """The board restarts while commands arrive, and verifies checksums again.
+
+    So it obeys only a mode line with a checksum. The driver sends one although the robot is
+    commanded to move, and the robot drives on.
+    """
+    bench = Bench(firmware, LoisEcuSettings(with_sum=False))
+    bench.run(5.0)
+    bench.drive_on(0.3, 3.0)
+    bench.board.reboot()
+    if firmware == "firmware":  # its boot takes 2 s, and the driver then refuses motion
+        bench.run(2.2)
+    bench.drive_on(0.3, 6.0)
+    assert bench.board.truth.speed_mps > 0.1
+
+
+@pytest.mark.slow
+def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
+    """Each round of settings sets the mode, which overwrites the left short correction.
+
+    Bug: the fifth round stopped after its first line while the robot drove. The board then drove
+    with a correction of almost 0, until the next stop.
+    """
+    rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
+    rig.run(2.0)
+    while not rig.driver.confirmed:
+        rig.run(0.1)
+        assert rig.now < 14.5
+    rig.order(20, 20, 2.0)
+    rig.driver.write_settings(rig.now)
+    rig.order(20, 20, 3.0)
+    assert rig.board.wheels[0].short_correction == pytest.approx(BOOT_SHORT_CORRECTION)
