@@ -24,7 +24,14 @@ from omnibot_driver.core.lois_ecu.messages import (
     Ticks,
 )
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
-from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, wrapped
+from omnibot_driver.core.lois_ecu.plausibility import (
+    FASTEST_TURNS_PER_S,
+    TICKS_MARGIN,
+    TURNS_MARGIN,
+    ClockUnit,
+    began_within,
+    wrapped,
+)
 from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,
@@ -242,13 +249,34 @@ class Translation:
         began = left + right > 0 and began_within(duration_s, ticks, per_turn)
         if began and not contradicted:
             began = self._unit == "ns" and self._restart_is_shown(ticks, duration_s, now)
-        if late or began or fewer > RESTARTED_TURNS * per_turn + RESTARTED_TICKS:
+        shrunk = fewer > RESTARTED_TURNS * per_turn + RESTARTED_TICKS
+        if shrunk and not contradicted:
+            shrunk = self._may_be_new(ticks, max(left, right), duration_s, now)
+        if late or began or shrunk:
             self.restarts += 1
             self.odometry.restarted(now, age_s)
             self._time.begin()
             self.headings.forget()
             return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]
         return []
+
+    def _may_be_new(self, ticks: Ticks, fallen: int, duration_s: float, now: float) -> bool:
+        """Return whether counts that have decreased fast can be those of a restarted board.
+
+        They cannot if they are larger than a wheel can roll in ``duration_s``. While the reports
+        show a clock in ns and counts of both wheels, they also cannot if the expected motion
+        explains them: in duty mode, wheels may roll back faster than ``RESTARTED_TURNS_PER_S``.
+
+        ``fallen``: the larger decrease of a count.
+        """
+        turns = FASTEST_TURNS_PER_S * duration_s + TURNS_MARGIN
+        most = turns * self._settings.ticks_per_revolution + TICKS_MARGIN
+        if max(abs(ticks.left), abs(ticks.right)) > most:
+            return False
+        known = self._unit == "ns" and self._unit_known and duration_s <= SILENT_S
+        if fallen > most or not (known and self.odometry.counting):
+            return True
+        return self.odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
         """Return the time in s since the board's start; None if it is unknown.

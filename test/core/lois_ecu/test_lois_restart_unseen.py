@@ -14,6 +14,9 @@ import pytest
 from lois_bench import Bench
 
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.lois_ecu.messages import SetDuty, Ticks
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.translation import Translation
 
 CLOCK_WRAPS_S = 2**32 / 1e9
 
@@ -137,3 +140,44 @@ def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: floa
     bench.run(2.0)
     assert restarts(bench) == 0
     assert error(bench)[0] < 0.05
+
+
+PERIOD_S = 0.2
+FAST_TICKS = 30
+"""Ticks of a wheel in ``PERIOD_S`` at 150 RPM."""
+
+
+def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
+    """Return a translation after two fast wheels have rolled forward 600 ticks, then ``steps``.
+
+    ``steps``: what each report then adds to the counts of the left and the right wheel.
+    """
+    settings = LoisEcuSettings(wheel_radius_m=0.03, drive_mode="duty", duty_scale=100.0)
+    translation, counts, now = Translation(settings), [0, 0], 0.0
+    for left, right in [(FAST_TICKS, FAST_TICKS)] * 20 + steps:
+        duty = SetDuty(*(round(47 * math.copysign(1.0, way)) for way in (left, right)))
+        translation.odometry.wrote(duty, now)
+        now += PERIOD_S
+        counts = [counts[0] + left, counts[1] + right]
+        clock = round(now * 1e9) % 2**32
+        translation.readings([Ticks(clock, *counts)], [now], "ns", now)
+    return translation
+
+
+@pytest.mark.parametrize("right", [-FAST_TICKS, FAST_TICKS])
+def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
+    """In duty mode, wheels may roll back at 150 RPM, until their counts are zero and below.
+
+    Bug: each report showed a restart if the counts decreased at more than 110 RPM. The pose then
+    went wrong by radians, and each current command was discarded.
+    """
+    slow = [(-FAST_TICKS // 2, right // 2)]
+    translation = fast_wheels(slow + [(-FAST_TICKS, right)] * 22)
+    assert translation.restarts == 0
+    expected_rad = 0.0 if right < 0 else 2 * 675 * math.tau / 60 * 0.03 / 0.47
+    assert translation.odometry.yaw_rad == pytest.approx(expected_rad, abs=0.15)
+
+
+def test_a_restart_of_a_board_with_fast_wheels_is_noticed() -> None:
+    """The board restarts while the wheels roll at 150 RPM. Its counts begin at zero."""
+    assert fast_wheels([(-596, -596), (2, 2)]).restarts == 1
