@@ -246,7 +246,11 @@ class Translation:
         rolled = RESTARTED_TURNS_PER_S * per_turn * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
-        began = left + right > 0 and began_within(duration_s, ticks, per_turn)
+        # Counts that were zero before do not decrease. Then only the clock shows the restart.
+        no_counts = not any((*ways, ticks.left, ticks.right))
+        clock_alone = contradicted and self._unit == "ns" and no_counts
+        decreased = left + right > 0 or clock_alone
+        began = decreased and began_within(duration_s, ticks, per_turn)
         if began and not contradicted:
             began = self._unit == "ns" and self._restart_is_shown(ticks, duration_s, now)
         shrunk = fewer > RESTARTED_TURNS * per_turn + RESTARTED_TICKS

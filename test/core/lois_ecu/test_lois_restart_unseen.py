@@ -14,7 +14,7 @@ import pytest
 from lois_bench import Bench
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.lois_ecu.messages import SetDuty, Ticks
+from omnibot_driver.core.lois_ecu.messages import SetDuty, Setting, Stream, Ticks
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.translation import Translation
 
@@ -140,6 +140,22 @@ def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: floa
     bench.run(2.0)
     assert restarts(bench) == 0
     assert error(bench)[0] < 0.05
+
+
+@pytest.mark.slow
+def test_a_restart_before_the_first_drive_is_noticed() -> None:
+    """The board restarts while its counts are still zero. Only its clock shows the restart.
+
+    Bug: the gains were not written again if ``ticks_period`` was about the period after a boot.
+    """
+    periods_ms = {Stream.TICKS: 400, Stream.ODOMETRY: 400}
+    settings = LoisEcuSettings(written={Setting.LEFT_KP: 0.5}, periods_ms=periods_ms)
+    bench = Bench("documented", settings)
+    bench.run(4.0)
+    bench.board.reboot()
+    bench.run(4.0)
+    assert restarts(bench) == 1
+    assert bench.board.wheels[0].controller.gains.kp == pytest.approx(0.5)
 
 
 PERIOD_S = 0.2
