@@ -167,7 +167,7 @@ class Ground:
         self._no_starts = 0
         self._obstacle_told = False
         self._stray_s = self._swept_s = self._stood_s = -math.inf
-        self._negative_sweep = self._rescue = False
+        self._negative_sweep = self._rescue = self._runs_on = False
         self._rested_s = -math.inf
         self._counted_at_rest = 0
         self._fresh = False

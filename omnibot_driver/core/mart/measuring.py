@@ -152,5 +152,6 @@ class Measuring(Starts):
             " the driver stops the robot",
             halt=True,
         )
+        self._runs_on = unknown
         self.motion = Motion.UNKNOWN
         self._halt(now)

@@ -55,7 +55,8 @@ class Starts(FailedStarts):
         self._use_turn_record()
         if setting := self._spin_setting(now):
             return self._ask(setting, now)
-        if not self._rolled_out and not self._rescue:
+        switch_off = self._switch_off.needed and (self._rescue or self._runs_on)
+        if not (self._rolled_out or self._rescue or switch_off):
             return NO_PACKETS  # a start would reset the count before the coasting was measured
         if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
             self._estop_said_s = now
@@ -63,7 +64,7 @@ class Starts(FailedStarts):
             return self._send(HALTS[Motion.UNKNOWN], now)
         if now < self.appeared_s + STARTS_UP_S:
             return NO_PACKETS
-        if self._switch_off.underway or (self._rescue and self._switch_off.needed):
+        if self._switch_off.underway or switch_off:
             return self._switch_motors_off(now)
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
@@ -198,7 +199,7 @@ class Starts(FailedStarts):
         self._recorded, self._port_is_free = None, False
         self._port_free_s, self._start_owed_until_s = math.inf, -math.inf
         self._greeted_before = now < self._greeted_s + self._delay_s
-        self._start, self._refused = start.word, False
+        self._start, self._refused, self._runs_on = start.word, False, False
         self._started_s = self._present_s = now
         self.imu.used()
         _, twist = self._wish(now)

@@ -270,3 +270,26 @@ def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
     bench.command(0.3, 0.0, 8.0)
     assert not bench.server.crashed
     assert not bench.robot.stands
+
+
+@pytest.mark.parametrize(
+    ("boot_s", "seed", "speed", "yaw_rate"), [(0.3, 93, 0.2, 0.0), (1.7, 110, 0.0, 0.4)]
+)
+def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_loses_datagrams(
+    boot_s: float, seed: int, speed: float, yaw_rate: float
+) -> None:
+    """The server restarts during a drive, and the motors keep running.
+
+    The network loses and duplicates datagrams. The stops have found no motion, but the robot moves.
+    The driver sends MCS at once. It does not wait until the robot has coasted, because it does not
+    coast.
+    """
+    faults = NetworkFaults(lose=0.05, duplicate=0.05, delay_s=0.05)
+    bench = MartBench(faults=faults, seed=seed).ready()
+    bench.command(speed, yaw_rate, 2.0)
+    assert not bench.robot.stands
+    bench.server.restart(boot_s)
+    bench.run(boot_s)
+    assert bench.until_it_stands() < 4.0
+    bench.run(1.0)
+    assert bench.robot.stands
