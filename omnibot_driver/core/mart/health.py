@@ -21,7 +21,7 @@ from omnibot_driver.core.mart.readings import (
 from omnibot_driver.core.mart.relative_heading import MOST_RAD, OLD_RAD
 from omnibot_driver.core.mart.replies import Ok
 from omnibot_driver.core.mart.states import Motion
-from omnibot_driver.core.mart.words import DOCKED, MCSTAT, SFC, SRC, VOLTS, Word
+from omnibot_driver.core.mart.words import DOCKED, MCSTAT, SFC, SRC, UNSUPPORTED, VOLTS, Word
 from omnibot_driver.core.readings import ExtraReading, Reading
 
 BITS: Final = {
@@ -85,6 +85,7 @@ class Health:
         self.volts: float | None = None
         self._status_before: int | None = None
         self._encoder_fails = 0
+        self._encoder_known = True
         self._before: dict[Word, float] = {}
         self._alike: Counter[Word] = Counter()
         self._voltages: deque[float] = deque(maxlen=4)
@@ -175,9 +176,13 @@ class Health:
             self.restarted()
         self._may_be_restarted = False
 
-    def encoder_failed(self) -> None:
-        """Record that the query of the encoder count (ENC) was answered by ``fail``."""
+    def encoder_failed(self, reason: str) -> None:
+        """Record that the query of the encoder count (ENC) was answered by ``fail``.
+
+        ``reason``: the text after ``fail``.
+        """
         self._encoder_fails += 1
+        self._encoder_known = reason != UNSUPPORTED
 
     def encoder_answers(self) -> None:
         """Record that the server answered the query of the encoder count (ENC) with a count."""
@@ -243,6 +248,11 @@ class Health:
             return (
                 f"the server is not a motion controller; it calls itself '{self.stranger}'; check"
                 " `port`"
+            )
+        if self._encoder_fails >= ENCODER_FAILS and not self._encoder_known:
+            return (
+                "the server does not know the command ENC (encoder count), so the driver cannot"
+                " measure the motion of the robot: update the server"
             )
         if self.tripped:
             return f"the motor board reports {self.tripped}: check motors, wiring and power"

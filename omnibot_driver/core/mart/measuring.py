@@ -38,7 +38,7 @@ class Measuring(Starts):
         word, reply = answer.word, answer.reply
         if isinstance(reply, Fail):
             if word is words.ENC:
-                self.health.encoder_failed()
+                self.health.encoder_failed(reply.reason)
             return
         if word is words.ENC:
             self._counted(signed(int(reply.number)), answer.when, now)

@@ -93,9 +93,10 @@ def parse(data: bytes) -> Reply:
     """Return the reply in one datagram; ``Other`` if it is not a reply."""
     if len(data) > LONGEST_REPLY or not data.isascii():
         return Other(data)
-    head, _, rest = data.rstrip(b" \0\r\n").decode("ascii").partition(" ")
+    head, _, rest = data.decode("ascii").strip(" \0\t\r\n").partition(" ")
+    rest = rest.strip()
     if head == "fail":
-        return Fail(rest.strip())
+        return Fail(rest)
     if head != "ok":
         return Other(data)
     for form, pattern in _FORMS:

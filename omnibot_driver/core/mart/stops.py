@@ -332,6 +332,8 @@ class Stops(Ground, ABC):
                 "the server knows of no motion: it was restarted, or another program has stopped"
                 " the robot"
             )
+        if reply.reason == words.UNSUPPORTED:
+            return "the server does not know the command that starts this motion: update the server"
         return (
             f"the controller has ended the motion ({reply.reason or 'no reason given'}): look for"
             " an obstacle, or another program that commands the robot"

@@ -120,7 +120,7 @@ def _word(
 
 # ENC: the encoder count; RMRA: the relative heading; SFC, SRC: the front and rear sonar
 HELLO = _word("HELLO", Kind.QUERY, {Form.NAME}, 0.05)
-ENC = _word("ENC", Kind.QUERY, _INTEGER, 0.25, {""})
+ENC = _word("ENC", Kind.QUERY, _INTEGER, 0.25, {"", UNSUPPORTED})
 RMRA = _word("RMRA", Kind.QUERY, _DECIMAL, 0.05)
 VOLTS = _word("VOLTS", Kind.QUERY, _DECIMAL, 0.05, {""})
 MCSTAT = _word("MCSTAT", Kind.QUERY, _INTEGER, 0.25)

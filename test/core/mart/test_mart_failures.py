@@ -386,3 +386,26 @@ def test_nobody_answers() -> None:
     assert bench.session.state == "connecting"
     assert sum("no data from the board" in notice for notice in bench.notices) == 1
     assert bench.try_command(0.3, 0.0)
+
+
+@pytest.mark.parametrize("word", [b"ENC", b"L"])
+def test_a_command_that_the_server_does_not_know_is_named_as_the_reason(word: bytes) -> None:
+    """The manual lists neither ENC nor L, so a server may refuse them as not supported.
+
+    The driver says that the server is the cause. It does not blame an obstacle or another program,
+    and it is not silent.
+    """
+    bench = MartBench("documented")
+    inner = bench.robot.receive
+
+    def receive(data: bytes, now: float, channel: int) -> None:
+        # the simulated server refuses the word "NO" as not supported
+        inner(b"NO" if data.split()[0] == word else data, now, channel)
+
+    bench.robot.receive = receive
+    bench.ready()
+    bench.command(0.0, 0.4, 2.0)
+    assert bench.robot.stands
+    said = [*bench.notices, bench.try_command(0.0, 0.4)]
+    assert any("does not know the command" in each for each in said), said
+    assert not any("obstacle" in each for each in said), said
