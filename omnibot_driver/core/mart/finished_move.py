@@ -22,7 +22,9 @@ SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 
 The word SLOW in a request doubles the times per degree and inch.
 """
-FULL, TWO = 0.6, 1.4
+LEAST_PACE: Final = 0.65
+"""Slowest motion of one run of a move, as a fraction of the usual speed of this move."""
+FULL, TWO = 0.6, 1.25
 """``FULL``: shortest duration of one complete run of a move. ``TWO``: shortest duration of two
 complete runs. Both are fractions of the move's usual duration."""
 LEAST_CUT_M, LEAST_CUT_RAD = 0.1, math.radians(15.0)
@@ -147,6 +149,17 @@ class Done:
         answer to the second run, which comes late.
         """
         return self.lasted_s >= TWO * self.usual_s
+
+    @property
+    def lags(self) -> bool:
+        """Whether a move that was cut short shows much less motion than its duration allows.
+
+        The network may have duplicated the request and lost the reply to the first run. The stop
+        has then cut the second run short, and the encoder shows only this run.
+        """
+        driven_s = self.lasted_s - 2 * SETTLES_S
+        least = LEAST_PACE * self.asked * driven_s / (self.usual_s - SETTLES_S)
+        return not self.completed and self._seen < least
 
     @property
     def ended_early(self) -> bool:

@@ -180,10 +180,12 @@ class Moves(Asking):
         # if the odometry was reset during the move, only a part of the move is measured
         whole = self._surplus.is_known(move) and not self.odometry.begins_in_move
         twice = stopped and whole and done.has_run_twice
-        doubtful = (stopped or self.conversation.disturbed(now)) and done.may_have_run_twice
+        slow = done.ended_late or done.lags
+        disturbed = stopped or slow or self.conversation.disturbed(now)
+        doubtful = disturbed and done.may_have_run_twice
         likely = stopped and not (completed and done.ended_early)
         if doubtful and not twice:
-            error = done.asked * (1.0 if likely or done.ended_late else UNLIKELY)
+            error = done.asked * (1.0 if likely or slow else UNLIKELY)
             self.odometry.doubt.add(*((error**2, 0.0) if done.is_straight else (0.0, error**2)))
         self.odometry.rest(done.longest)
         if done.went_the_wrong_way and self._move is not None and not self._move.given_up:

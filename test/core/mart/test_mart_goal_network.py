@@ -7,12 +7,14 @@ from random import Random
 from typing import Any
 
 import pytest
+from honesty import RARE, nees
 from mart_bench import MartBench
 from mart_goals import EVERY_FIRMWARE, drops, on, random_goal, reach, yaw_error
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings as Settings
 from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
@@ -298,3 +300,42 @@ def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
     assert bench.robot.stands
     assert math.pi / 2 < bench.truth.yaw_rad < 0.75 * math.pi
     assert b"SS" in bench.said()
+
+
+@pytest.mark.parametrize("cut_s", [0.7, 1.3, 2.0, 2.4, 2.8, math.inf])
+@pytest.mark.parametrize("goal", [Pose(0.0, 0.0, 2.8), Pose(1.0, 0.0, 0.0)])
+def test_a_second_run_whose_first_reply_is_lost_makes_the_odometry_uncertain(
+    goal: Pose, cut_s: float
+) -> None:
+    """The network duplicates a move, and loses the reply to its first run.
+
+    The encoder counts only the second run, which ends by itself or is stopped. The covariance
+    includes the first run.
+    """
+    bench = MartBench("source").ready()
+    to_board, from_board = bench.robot.receive, bench.robot.advance
+    copied = lost = False
+
+    def receive(data: bytes, now: float, channel: int) -> None:
+        nonlocal copied
+        to_board(data, now, channel)
+        if data.startswith((b"MC", b"TF")) and not copied:
+            copied = True
+            to_board(data, now, channel)
+
+    def advance() -> list[Packet]:
+        nonlocal lost
+        kept: list[Packet] = []
+        for packet in from_board():
+            if copied and not lost and packet[1].startswith(b"ok"):
+                lost = True
+            else:
+                kept.append(packet)
+        return kept
+
+    vars(bench.robot).update(receive=receive, advance=advance)
+    bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
+    bench.run_until(lambda: lost, 20.0)
+    bench.run(min(cut_s, 30.0))
+    bench.command(0.0, 0.0, 4.0)
+    assert nees(bench) < RARE
