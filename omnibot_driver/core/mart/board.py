@@ -102,6 +102,7 @@ class MartBoard(Board):
         return BoardFigures(
             rates_hz={},
             faults=pilot.decoder.foreign,
+            odom_hz=self.settings.odom_rate_hz,
             own={
                 "Motion": pilot.state.value,
                 "Motor board": pilot.health.bits,

@@ -158,6 +158,11 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
     assert re.fullmatch(r"docking: [23] s of at most 90 s", bench.board.figures.own["Job"])
 
 
+def test_diagnostics_have_the_rate_of_odom() -> None:
+    """/diagnostics contain the rate of odom, because the report compares odom with this rate."""
+    assert MartBench(settings=MartSettings(odom_rate_hz=10.0)).board.figures.odom_hz == 10.0
+
+
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
     """The robot reaches two goals within 10 cm and 6 degrees.
