@@ -180,6 +180,19 @@ def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path,
         log_of(bag)
 
 
+def test_an_mcap_that_breaks_off_in_its_first_chunk_is_not_called_empty(
+    drive: Drive, tmp_path: Path
+) -> None:
+    """The only chunk of an MCAP file is cut off. The error does not say that the bag is empty.
+
+    It says that the file is incomplete.
+    """
+    bag = write(tmp_path / "bag", [drive])
+    file = cut(bag, 5000)
+    with pytest.raises(ToolError, match=f"no message that can be .* {file.name} is incomplete"):
+        log_of(bag)
+
+
 def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_path: Path) -> None:
     """A killed recorder leaves a write-ahead log beside the database. The report reads it, too."""
     bag = write(tmp_path / "bag", [drive], StoragePlugin.SQLITE3)

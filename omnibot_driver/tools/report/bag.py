@@ -38,6 +38,8 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
         readers, troubles = _open(path, stack)
         connections = [connection for reader in readers for connection in reader.connections]
         if not any(reader.message_count for reader in readers):
+            if troubles:
+                raise ToolError(f"{path} has no message that can be read: {'; '.join(troubles)}")
             raise ToolError(f"{path} is empty: nothing was recorded into it")
         robots = find((item.topic, item.msgtype) for item in connections)
         robot, topics = choose(robots, namespace, str(path))
