@@ -5,6 +5,7 @@
 A save is complete or changes nothing, and it keeps the other entries of the file.
 """
 
+import os
 import stat
 from pathlib import Path
 
@@ -75,6 +76,24 @@ def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
     """The calibration file cannot be read, because its path leads to a folder. An error says so."""
     with pytest.raises(ParameterError, match=r"cannot be read \(Is a directory\): correct the"):
         calibration.load(tmp_path, PARAMETERS)
+
+
+def test_a_pipe_or_a_device_is_not_a_file(tmp_path: Path) -> None:
+    """The path leads to a pipe, which has no end, or to a device, which a save would replace.
+
+    An error says so. The pipe is not read and not replaced.
+    """
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    for use in (
+        lambda: calibration.load(path, PARAMETERS),
+        lambda: calibration.save(path, {"gyro_bias": BIAS}),
+    ):
+        with pytest.raises(ParameterError, match="not a file, but a device or a pipe: give anoth"):
+            use()
+    assert path.is_fifo()
+    with pytest.raises(ParameterError, match="/dev/null is not a file"):
+        calibration.load(Path("/dev/null"), PARAMETERS)
 
 
 def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
