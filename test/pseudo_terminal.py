@@ -52,9 +52,12 @@ class PseudoTerminal:
         self._reader.join()
 
     def type(self, keys: str) -> None:
-        """Send keys as if they were pressed one after the other."""
+        """Send keys as if they were pressed one after the other.
+
+        A surrogate escape such as "\\udce4" is sent as one byte that is not UTF-8.
+        """
         with self._changed:
-            os.write(self._far, keys.encode())
+            os.write(self._far, keys.encode(errors="surrogateescape"))
 
     @contextlib.contextmanager
     def holding(self, key: str) -> Iterator[None]:

@@ -138,6 +138,27 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
     assert terminal.end() == 0
 
 
+def test_the_space_bar_works_after_a_byte_that_is_no_key(
+    driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
+) -> None:
+    """Bytes that are not UTF-8 arrive from the keyboard, before the space bar and with it.
+
+    The monitor ignores them, and the e-stop is latched.
+    """
+    terminal = monitor_of(driver)
+    terminal.wait_for("nominal")
+    terminal.type("\udce4")
+    terminal.type("\udcff \udce4")
+    terminal.wait_for("LATCHED")
+    assert board.wait_for(lambda b: any(c.kind == "estop" for c in b.commands), PATIENCE_S)
+    terminal.type("R")
+    terminal.wait_for("Release")
+    terminal.type("y")
+    terminal.wait_for("not latched")
+    terminal.type("q")
+    assert terminal.end() == 0
+
+
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:

@@ -6,8 +6,10 @@ The module knows terminals and keys; it does not know ROS.
 """
 
 import asyncio
+import codecs
 import signal
 import time
+from functools import partial
 from typing import ClassVar, Final, Protocol
 
 from rich.text import Text
@@ -15,6 +17,7 @@ from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
+from textual.drivers import linux_driver
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Static
 
@@ -23,6 +26,12 @@ from omnibot_driver.tools.monitor import text
 from omnibot_driver.tools.monitor.model import View
 from omnibot_driver.tools.monitor.plot import ARROWS, draw_path
 from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
+
+# Textual decodes keys strictly: one byte that is not UTF-8, from line noise or from a terminal with
+# another encoding, would end the monitor, and the e-stop key with it.
+linux_driver.getincrementaldecoder = lambda encoding: partial(  # type: ignore[attr-defined]
+    codecs.getincrementaldecoder(encoding), errors="replace"
+)
 
 REFRESH_S: Final = 0.2
 PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
