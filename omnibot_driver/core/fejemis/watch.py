@@ -112,7 +112,7 @@ class Watch:
                 notify = self._told.tell if was_missed else self._told.halt
                 notify(
                     f"no data from the {self._ports.role(channel)} board at `{parameter}`; check"
-                    " its power and cable",
+                    " its power and cable, and whether another program uses its port",
                     now,
                 )
             return False
