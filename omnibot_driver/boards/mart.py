@@ -7,13 +7,32 @@ from functools import partial
 from typing import Any, Final
 
 from omnibot_driver.boards.mart_parameters import DRIVING, SENSORS, WHEELS
+from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.mart.board import TRAITS, MartBoard
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.parameters import table
+from omnibot_driver.recording import is_recording
 from omnibot_driver.transports.udp import UdpPorts, check_address
 
 SIMULATOR: Final = "omnibot_driver.simulator.mart"
+
+
+def refuse_recordings(values: Mapping[str, Any]) -> None:
+    """Raise ParameterError if the port is a recording.
+
+    The controller sends only replies, and a reply does not name its request. So the replies alone
+    show neither the motion nor the odometry.
+    """
+    if is_recording(values["port"]):
+        raise ParameterError(
+            f"port '{values['port']}' is not valid: a MART controller's recording cannot be"
+            " replayed, because its odometry depends on what the driver sent; play the recorded"
+            " odom with `ros2 bag play`, or run `ros2 run omnibot_driver report` on the bag; check"
+            " the parameter `board` too"
+        )
+
+
 PARAMETERS: Final = table(
     "mart",
     TRAITS,
@@ -38,10 +57,14 @@ PARAMETERS: Final = table(
         "port": {
             "default": "udp://192.168.1.50:5000",
             "description": "Address of the controller, udp://host:port; the stop port has the next"
-            " higher number. sim:// is a simulated board inside the driver, and replay://bag plays"
-            " a recorded bag.",
+            " higher number. sim:// is a simulated board inside the driver.",
+        },
+        "publish_raw": {
+            "description": "Publish the bytes of every datagram on ~/raw_rx and ~/raw_tx, each"
+            " with /command and /stop."
         },
     },
+    checks=(refuse_recordings,),
 )
 
 

@@ -1,0 +1,28 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests that a MART controller's recording is refused as a port, and that no text offers it."""
+
+import pytest
+
+from omnibot_driver import boards
+from omnibot_driver.core.errors import ParameterError
+
+
+@pytest.mark.parametrize("port", ["replay://field", "REPLAY://field?speed=10"])
+def test_a_recording_is_refused_with_what_to_do_instead(port: str) -> None:
+    """A user gives a recording as the port of a MART controller.
+
+    The odometry depends on the driver's requests, which a replay does not send again. So the port
+    is refused, and the message names two other uses of the bag.
+    """
+    with pytest.raises(ParameterError) as refusal:
+        boards.check_all({"board": "mart", "port": port})
+    assert str(refusal.value).startswith(f"port '{port}' is not valid: ")
+    for other in ("`ros2 bag play`", "`ros2 run omnibot_driver report`"):
+        assert other in str(refusal.value)
+
+
+def test_no_parameter_offers_a_replay() -> None:
+    """Nothing in the parameters of a MART controller names ``replay://``."""
+    rows = boards.load("mart").PARAMETERS.rows
+    assert not [row.name for row in rows if "replay" in row.description]
