@@ -7,6 +7,7 @@ This module knows the URL and the library rosbags; it does not know what the byt
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -40,20 +41,26 @@ class Recording:
 
         Raises LinkError if the bag cannot be read to its end.
         """
+        troubles: list[str] = []
         try:
-            from rosbags.rosbag2 import Reader
             from rosbags.typesys import Stores, get_typestore
 
+            from omnibot_driver.bag_files import messages, open_bag
+
             types = get_typestore(Stores.ROS2_JAZZY)
-            with Reader(self.path) as bag:
-                wanted = [item for item in bag.connections if item.topic in self.topics]
-                for source, at_ns, message in bag.messages(wanted):
-                    content: Any = types.deserialize_cdr(message, RAW_TYPE)
-                    yield at_ns, (self.topics.index(source.topic), content.data.tobytes())
+            with ExitStack() as stack:
+                readers, troubles = open_bag(self.path, stack)
+                for reader in readers:
+                    for source, at_ns, message in messages(reader, self.topics, troubles):
+                        content: Any = types.deserialize_cdr(message, RAW_TYPE)
+                        yield at_ns, (self.topics.index(source.topic), content.data.tobytes())
         except Exception as error:  # a damaged bag can raise any exception
-            raise LinkError(
-                f"the recording {self.path} cannot be read any further: {error}"
-            ) from error
+            raise self._unreadable(str(error)) from error
+        if troubles:
+            raise self._unreadable("; ".join(troubles))
+
+    def _unreadable(self, why: str) -> LinkError:
+        return LinkError(f"the recording {self.path} cannot be read any further: {why}")
 
 
 def is_recording(url: str) -> bool:
@@ -82,7 +89,7 @@ def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
 
 def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> tuple[str, ...]:
     try:
-        from rosbags.rosbag2 import Reader
+        import rosbags.rosbag2  # noqa: F401
     except ImportError as error:
         raise ParameterError(
             f"port '{url}' needs the Python library rosbags: `pip install --user"
@@ -90,11 +97,17 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         ) from error
     if not path.exists():
         raise _refusal(url, f"there is no {path.absolute()}; give the folder of a bag")
+    from omnibot_driver.bag_files import open_bag
+
     try:
-        with Reader(path) as bag:
-            raw = sorted({item.topic for item in bag.connections if item.msgtype == RAW_TYPE})
+        with ExitStack() as stack:
+            readers, troubles = open_bag(path, stack)
+            topics = {(each.topic, each.msgtype) for bag in readers for each in bag.connections}
     except Exception as error:  # rosbags can raise any exception
-        raise _refusal(url, f"{path} is not a readable bag: {error}") from error
+        readers, troubles = [], [str(error)]
+    if not readers:
+        raise _refusal(url, f"{path} is not a readable bag: {'; '.join(troubles)}")
+    raw = sorted(topic for topic, kind in topics if kind == RAW_TYPE)
     names = [f"/{name}" if name else "" for name in channels]
     found = {
         topic.removesuffix(name)

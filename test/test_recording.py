@@ -5,6 +5,7 @@
 Unsuitable bags and options are refused with a message.
 """
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.recording import is_recording, open_recording
+from omnibot_driver.salvage import DATA_END, MAGIC
 
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 RAW = "std_msgs/msg/UInt8MultiArray"
@@ -163,14 +165,40 @@ def test_without_the_library_it_says_what_to_install(
 
 
 def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> None:
-    """A bag is damaged after the replay has opened it. The next read raises an error.
+    """A bag is removed after the replay has opened it. The next read raises an error.
 
     The error says that the bag cannot be read any further.
     """
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
-    (tmp_path / "bag" / "metadata.yaml").unlink()
+    shutil.rmtree(tmp_path / "bag")
     with pytest.raises(LinkError, match="cannot be read any further"):
         list(recording.chunks())
+
+
+@pytest.mark.parametrize("given", ["file", "folder", "reindexed folder"])
+def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
+    tmp_path: Path, given: str
+) -> None:
+    """A recorder was killed. The mcap file lacks its end, and the folder lacks metadata.yaml.
+
+    The replay has every complete packet, and then says what is incomplete. `ros2 bag reindex` adds
+    only metadata.yaml, so the result is the same after it. The bag is not changed.
+    """
+    path = bag(tmp_path / "bag", RX)
+    file = path / "bag.mcap"
+    content = file.read_bytes()
+    end = len(MAGIC)
+    while content[end] != DATA_END:
+        end += 9 + int.from_bytes(content[end + 1 : end + 9], "little")
+    file.write_bytes(content[:end] + b"\x05\x40")
+    if given != "reindexed folder":
+        (path / "metadata.yaml").unlink()
+    recording = open_recording(f"replay://{file if given == 'file' else path}")
+    chunks = recording.chunks()
+    assert [next(chunks) for _ in PACKETS] == PACKETS
+    with pytest.raises(LinkError, match=r"any further: .*the file bag\.mcap is incomplete"):
+        next(chunks)
+    assert file.read_bytes() == content[:end] + b"\x05\x40"
 
 
 def test_only_its_own_urls_are_taken() -> None:
