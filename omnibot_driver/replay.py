@@ -23,6 +23,9 @@ from omnibot_driver.recording import Recording
 JOIN_TIMEOUT_S: Final = 1.0
 SHORTEST_STEP_S: Final = 0.001
 """Shortest time between two calls of ``Session.tick``, in s, even if the session asks for less."""
+LONGEST_PAUSE_S: Final = 10.0
+"""How much of a pause of the recording is played, in s. By then, the session has noticed the
+silence, and nothing more happens in it."""
 
 T = TypeVar("T")
 
@@ -134,10 +137,25 @@ class Replay:
         self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
-        """Call ``Session.tick`` at each due time until ``end_s``.
+        """Call ``Session.tick`` at each due time until ``end_s``. Skip most of a long pause.
 
-        Returns False if ``close`` interrupts this.
+        A skipped time passes for the session, but not for the user. Returns False if ``close``
+        interrupts this.
         """
+        pause_s = end_s - self._now
+        if pause_s > LONGEST_PAUSE_S:
+            notice = Notice(
+                f"the recording has no data for {pause_s:.0f} s here, or the recorder's clock was"
+                f" set; the replay skips all but {LONGEST_PAUSE_S:.0f} s of it"
+            )
+            self._tell(partial(self._deliver, [notice], self._epoch_ns))
+            if not self._tick_until(self._now + LONGEST_PAUSE_S):
+                return False
+            self._began_at -= (end_s - self._now) / self._recording.speed
+            return self._pass(end_s)
+        return self._tick_until(end_s)
+
+    def _tick_until(self, end_s: float) -> bool:
         while (due_s := self._due()) < end_s:
             if not self._pass(due_s):
                 return False

@@ -162,6 +162,27 @@ def test_time_passes_as_it_did() -> None:
     assert heard.reports == [None]
 
 
+@pytest.mark.parametrize("speed", [100.0, math.inf])
+def test_a_step_of_the_recorders_clock_is_not_waited_for(speed: float) -> None:
+    """The recorder's clock was set forward by 1000 days in the middle of a drive.
+
+    The replay says so, plays 10 s of the pause, and continues with the stamps of the recording.
+    """
+    step_s = 1000 * 86_400
+    drive = simulated(400)
+    chunks = drive[:200] + [(at_ns + step_s * 10**9, data) for at_ns, data in drive[200:]]
+    heard = play(Tape(chunks, speed=speed))
+    said = [event.text for event in heard.events if isinstance(event, Notice)]
+    assert "the recording has no data for 86400000 s here" in said[0]
+    assert heard.states == ["connecting", "nominal", "connecting", "nominal", "disconnected"]
+    stamps = [event.stamp_s for event in heard.events if isinstance(event, ImuEstimate)]
+    before, after = stamps[0], stamps[-1]
+    assert before == pytest.approx(0.0, abs=0.005)
+    assert after == pytest.approx(step_s + 3.99, abs=0.01)
+    assert all(stamp_s < 3.0 or stamp_s > step_s for stamp_s in stamps)
+    assert stamps == sorted(stamps)
+
+
 def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
     """A recorded robot moves, but a replay has no commands.
 
