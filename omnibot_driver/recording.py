@@ -113,7 +113,7 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         topic.removesuffix(name)
         for name in names
         for topic in raw
-        if (topic == wanted if wanted else topic.endswith(f"{RAW_NAME}{name}"))
+        if topic.endswith(name if wanted else f"{RAW_NAME}{name}") and wanted in ("", topic)
     }
     if wanted and any(names):
         found = {topic for topic in found if topic.endswith(RAW_NAME)}
@@ -122,6 +122,14 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         return tuple(home + name for name in names)
     if not raw:
         raise _refusal(url, f"the bag has no topic {RAW_NAME[1:]}; record with `publish_raw: true`")
+    if not found and (not wanted or wanted in raw):
+        missing = " or ".join(f"{RAW_NAME[1:]}{name}" for name in names)
+        received = [topic for topic in raw if RAW_NAME in topic] or raw
+        raise _refusal(
+            url,
+            f"this board needs a topic {missing}, but the bag has {', '.join(received)}; check the"
+            " parameter `board`, or choose a topic with topic=",
+        )
     raise _refusal(url, f"choose one of the bag's topics with topic={' or topic='.join(raw)}")
 
 

@@ -7,6 +7,7 @@ Unsuitable bags and options are refused with a message.
 
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -131,6 +132,32 @@ def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
     path = bag(tmp_path / "bag", "/b/raw_rx", "/a/raw_rx")
     with pytest.raises(ParameterError, match="topic=/a/raw_rx or topic=/b/raw_rx"):
         open_recording(f"replay://{path}")
+
+
+@pytest.mark.parametrize(
+    ("recorded", "channels", "query", "needed"),
+    [
+        (("/drive", "/front"), ("",), "", "raw_rx"),
+        (("",), ("drive", "front"), "", "raw_rx/drive or raw_rx/front"),
+        (("",), ("drive", "front"), f"?topic={RX}", "raw_rx/drive or raw_rx/front"),
+    ],
+)
+def test_the_bag_of_another_board_names_the_missing_lines_and_the_board(
+    tmp_path: Path, recorded: Sequence[str], channels: Sequence[str], query: str, needed: str
+) -> None:
+    """A bag has no line of the selected board, but lines of another board.
+
+    The message names the lines that this board needs and those that the bag has, and says that the
+    parameter ``board`` may be wrong. Sent bytes are not offered.
+    """
+    present = [RX + name for name in recorded]
+    sent = "/omnibot_driver/raw_tx"
+    path = bag(tmp_path / "bag", *present, *(sent + name for name in recorded))
+    with pytest.raises(ParameterError) as refusal:
+        open_recording(f"replay://{path}{query}", channels)
+    text = str(refusal.value)
+    assert f"this board needs a topic {needed}, but the bag has {', '.join(present)};" in text
+    assert "check the parameter `board`" in text
 
 
 def test_what_is_not_a_bag_is_refused(tmp_path: Path) -> None:
