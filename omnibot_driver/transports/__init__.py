@@ -3,7 +3,7 @@
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
 Every LinkError says what to do. The transports know descriptors and bytes; they know neither
-threads nor boards.
+boards nor the threads that use them.
 """
 
 from collections.abc import Mapping

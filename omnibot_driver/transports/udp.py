@@ -2,8 +2,8 @@
 
 """Datagrams to one host: ``udp://host:port``. Each further channel uses the next higher port.
 
-A host that does not answer is treated as a silent board, because it may answer later. It does not
-cause an error.
+A host that does not answer is treated as a silent board, because it may answer later. It causes an
+error only if its name has got another address.
 """
 
 import contextlib
@@ -18,6 +18,7 @@ from urllib.parse import urlsplit
 from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.core.packets import Packet, Packets
 from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S, WRITE_TIMEOUT_S
+from omnibot_driver.transports.host_name import HostName
 from omnibot_driver.transports.wake_up import WakeUp
 
 SCHEME: Final = "udp://"
@@ -65,9 +66,16 @@ class UdpPorts:
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
-        """Return one datagram and its channel, or ``(0, b"")`` if none arrives within 0.2 s."""
+        """Return one datagram and its channel, or ``(0, b"")`` if none arrives within 0.2 s.
+
+        Raises LinkError if the connection is lost, or if the silent host has another address now.
+        """
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
+        if self._name.has_moved():
+            raise LinkError(
+                f"the address of {self._host} has changed; the driver connects to the new address"
+            )
         if not self._ready:
             return 0, b""
         ready = self._ready.pop()
@@ -76,11 +84,13 @@ class UdpPorts:
             return 0, b""
         channel = self._channels[ready]
         try:
-            return channel, self._sockets[channel].recv(LARGEST)
+            data = self._sockets[channel].recv(LARGEST)
         except OSError as error:
             if _is_silence(error):
                 return 0, b""
             raise self._lost(channel, error) from error
+        self._name.heard()
+        return channel, data
 
     def write(self, packets: Packets) -> None:
         """Write each packet as a datagram."""
@@ -121,6 +131,7 @@ class UdpPorts:
         family, kind, protocol, _, (address, _, *rest) = socket.getaddrinfo(
             self._host, self._port, type=socket.SOCK_DGRAM
         )[0]
+        self._name = HostName(self._host, str(address))
         for number in range(channels):
             ours = socket.socket(family, kind, protocol)
             self._sockets.append(ours)

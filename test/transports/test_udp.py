@@ -10,11 +10,13 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.core.packets import Packet
+from omnibot_driver.transports import host_name, udp
 from omnibot_driver.transports.udp import UdpPorts, check_address
 
 PATIENCE_S = 60.0
@@ -180,3 +182,118 @@ def test_a_host_that_is_not_known_is_reported() -> None:
     with pytest.raises(LinkError, match="check the parameter `port`"):
         UdpPorts("udp://no-such-host.invalid:5000", 2)
     assert len(os.listdir("/proc/self/fd")) == before
+
+
+class Names:
+    """A name service in which ``robot.local`` has the addresses ``addresses``, or is unknown.
+
+    ``lookups``: one permit for each lookup of this name. ``gate``: lookups wait until it is set.
+    """
+
+    def __init__(self) -> None:
+        self.addresses = ["127.0.0.1"]
+        self.lookups = threading.Semaphore(0)
+        self.gate = threading.Event()
+        self.gate.set()
+        self._real = socket.getaddrinfo
+
+    def look_up(self, host: str, *more: Any, **options: Any) -> list[Any]:
+        if host != "robot.local":
+            return self._real(host, *more, **options)
+        self.lookups.release()
+        assert self.gate.wait(PATIENCE_S)
+        if not self.addresses:
+            raise socket.gaierror(socket.EAI_NONAME, "unknown")
+        return [each for ip in self.addresses for each in self._real(ip, *more, **options)]
+
+    def wait_for(self, lookups: int, transport: UdpPorts) -> None:
+        """Read until this number of further lookups has begun. No data must arrive."""
+        end = time.monotonic() + PATIENCE_S
+        while lookups:
+            assert transport.read() == (0, b"")
+            lookups -= self.lookups.acquire(blocking=False)
+            assert time.monotonic() < end
+
+
+@pytest.fixture
+def names(monkeypatch: pytest.MonkeyPatch) -> Names:
+    names = Names()
+    monkeypatch.setattr(socket, "getaddrinfo", names.look_up)
+    monkeypatch.setattr(udp, "READ_TIMEOUT_S", 0.001)
+    monkeypatch.setattr(host_name, "SILENT_S", 0.0)
+    return names
+
+
+@pytest.fixture
+def named(host: Host, names: Names) -> Iterator[UdpPorts]:
+    transport = UdpPorts(f"udp://robot.local:{host.number}", 2)
+    assert names.lookups.acquire(blocking=False)
+    yield transport
+    transport.close()
+
+
+def test_a_silent_host_with_another_address_is_lost(names: Names, named: UdpPorts) -> None:
+    """A host is silent, and its name gets another address. The read fails, and says why.
+
+    The reader then opens the port again, at the new address.
+    """
+    names.wait_for(2, named)
+    names.addresses = ["127.0.0.2", "127.0.0.3"]
+    with pytest.raises(LinkError, match=r"the address of robot\.local has changed"):
+        names.wait_for(1_000_000, named)
+
+
+@pytest.mark.parametrize("addresses", [[], ["127.0.0.2", "127.0.0.1"]])
+def test_a_silent_host_that_may_have_the_same_address_is_not_lost(
+    addresses: list[str], names: Names, named: UdpPorts
+) -> None:
+    """A host is silent. Its name cannot be looked up, or still has the address in use as well.
+
+    The port stays open.
+    """
+    names.addresses = addresses
+    names.wait_for(5, named)
+
+
+def test_a_slow_lookup_does_not_hold_up_the_data(host: Host, names: Names, named: UdpPorts) -> None:
+    """A lookup waits for the name service. Meanwhile data is read, and no second lookup begins."""
+    named.write(((0, b"hello"),))
+    _, driver = host.ports[0].recvfrom(99)
+    names.gate.clear()
+    names.wait_for(1, named)
+    for _ in range(20):
+        assert named.read() == (0, b"")
+    assert not names.lookups.acquire(blocking=False)
+    host.ports[0].sendto(b"ok", driver)
+    assert next_packet(named) == (0, b"ok")
+    names.gate.set()
+
+
+def test_a_host_that_answers_is_not_looked_up(
+    host: Host, names: Names, named: UdpPorts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each datagram of the host postpones the next lookup of its name."""
+    named.write(((0, b"hello"),))
+    _, driver = host.ports[0].recvfrom(99)
+    monkeypatch.setattr(host_name, "SILENT_S", PATIENCE_S)
+    host.ports[0].sendto(b"ok", driver)
+    while named.read() != (0, b"ok"):
+        pass
+    while names.lookups.acquire(blocking=False):
+        pass
+    for _ in range(20):
+        named.read()
+    assert not names.lookups.acquire(blocking=False)
+
+
+def test_an_address_is_not_looked_up(
+    host: Host, names: Names, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The URL has an address instead of a name. An address cannot change, so no lookup begins."""
+    with contextlib.closing(UdpPorts(host.url, 2)) as transport:
+        monkeypatch.setattr(
+            socket, "getaddrinfo", lambda *_, **__: pytest.fail("the address was looked up")
+        )
+        for _ in range(20):
+            assert transport.read() == (0, b"")
+        assert "omnibot-name" not in [thread.name for thread in threading.enumerate()]

@@ -1,0 +1,68 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The name of a host that is silent: does it still have the address in use?
+
+A host may come back with another address, for example from DHCP. This module looks up names; it
+does not know what is sent to the host.
+"""
+
+import ipaddress
+import socket
+import threading
+import time
+from typing import Final
+
+SILENT_S: Final = 5.0
+"""Time in s for which a host must be silent before its name is looked up again. It is also the
+least time between two such lookups."""
+
+
+class HostName:
+    """The name of a host, and whether the host has left the address ``in_use``.
+
+    A lookup can take long. So it runs in a thread of its own, and only one runs at a time.
+    """
+
+    def __init__(self, name: str, in_use: str) -> None:
+        self._name, self._in_use = name, in_use
+        self._is_name = not _is_address(name)
+        self._lookup: threading.Thread | None = None
+        self.heard()
+
+    def heard(self) -> None:
+        """Record that the host has sent something, so its address is right."""
+        self._heard_s = self._asked_s = time.monotonic()
+        self._left = False
+
+    def has_moved(self) -> bool:
+        """Return whether the host is silent and its name no longer leads to the address in use.
+
+        If a lookup is due, this begins it and does not wait for it.
+        """
+        now = time.monotonic()
+        if not self._is_name or now < self._heard_s + SILENT_S:
+            return False
+        if now >= self._asked_s + SILENT_S and not self._looks_up:
+            self._asked_s = now
+            self._lookup = threading.Thread(target=self._look_up, name="omnibot-name", daemon=True)
+            self._lookup.start()
+        return self._left
+
+    @property
+    def _looks_up(self) -> bool:
+        return self._lookup is not None and self._lookup.is_alive()
+
+    def _look_up(self) -> None:
+        try:
+            found = socket.getaddrinfo(self._name, None, type=socket.SOCK_DGRAM)
+        except OSError:
+            return  # the name service may be away too
+        self._left = self._in_use not in {place[0] for *_, place in found}
+
+
+def _is_address(host: str) -> bool:
+    try:
+        ipaddress.ip_address(host)
+    except ValueError:
+        return False
+    return True
