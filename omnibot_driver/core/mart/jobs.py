@@ -2,8 +2,8 @@
 
 """Jobs: requests that do not come from motion topics, such as a download. One runs at a time.
 
-A file arrives in unnumbered pieces of 512 bytes. This module knows commands and replies; it does
-not know when the command port is free. The caller passes the time.
+This module knows commands and replies; it does not know when the command port is free. The caller
+passes the time.
 """
 
 import math
@@ -13,11 +13,11 @@ from typing import Final
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Answer
+from omnibot_driver.core.mart.incoming_file import IncomingFile
 from omnibot_driver.core.mart.readings import JobDone
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.words import Form, Request, Word
 
-PIECE: Final = 512
 QUIET_S: Final = 1.0
 """Time in s that the driver waits for a further piece of a file. After this time without a piece,
 it expects no more pieces.
@@ -72,6 +72,15 @@ OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
 sent."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs whose request may be sent again if the reply is missing."""
+COMPARED: Final = frozenset({Job.LAST_MOVE, Job.LAST_TURN})
+"""Downloads that the driver makes twice if the pieces of the file do not show their order.
+
+The job succeeds only if both downloads are equal.
+"""
+UNPROVED: Final = (
+    "the order of its pieces is not proved: compare it with the file on the controller, before"
+    " ~/start_log deletes that file"
+)
 
 
 class Jobs:
@@ -106,15 +115,15 @@ class Jobs:
         self._waiting = False
         self._tries = 0
         self._until_s = math.inf
-        self._name, self._size = "", -1
-        self._pieces: list[bytes] = []
+        self._file: IncomingFile | None = None
+        self._first: IncomingFile | None = None
         self._piece_s = math.inf
         self.moving = False
 
     @property
     def collecting(self) -> bool:
         """Whether the job waits for pieces of a file."""
-        return self._size >= 0
+        return self._file is not None
 
     @property
     def wake_at(self) -> float:
@@ -129,9 +138,8 @@ class Jobs:
         since = (
             f"{self.job.value}: {now - self._until_s + limit_s:.0f} s of at most {limit_s:.0f} s"
         )
-        if not self.collecting:
-            return since
-        return f"{since}, {sum(map(len, self._pieces))} of {self._size} bytes"
+        file = self._file
+        return since if file is None else f"{since}, {file.came} of {file.size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job. It replaces a job that the driver itself began and has not sent yet.
@@ -184,7 +192,7 @@ class Jobs:
         if isinstance(reply, Fail):
             self._finish(False, f"the controller answers: {reply.reason or 'fail'}; call again")
         elif reply.form is Form.FILE:
-            self._name, self._size = reply.file
+            self._file = IncomingFile(*reply.file)
             self._piece_s = now + QUIET_S
         elif job is Job.LOG_FILE:
             self._finish(False, f"the server has ended without sending a file; {COPY}")
@@ -224,23 +232,18 @@ class Jobs:
             )
 
     def piece(self, data: bytes, now: float) -> None:
-        """Keep a datagram as a piece of the file.
-
-        A datagram is ignored if it has neither the length of a full piece nor that of the last
-        piece.
-        """
-        if data and len(data) in (PIECE, self._size % PIECE):
-            self._pieces.append(data)
-            complete = len(self._pieces) * PIECE >= self._size
-            if self.job is Job.TURN_RECORD:
-                self._piece_s = now + (0.0 if complete else RECORD_QUIET_S)
-            else:
-                self._piece_s = now + (QUIET_S / 3 if complete else QUIET_S)
+        """Keep a datagram as a piece of the file, if its length allows that."""
+        if self._file is None or not self._file.add(data):
+            return
+        if self.job is Job.TURN_RECORD:
+            self._piece_s = now + (0.0 if self._file.complete else RECORD_QUIET_S)
+        else:
+            self._piece_s = now + (QUIET_S / 3 if self._file.complete else QUIET_S)
 
     def tick(self, now: float) -> None:
         """End a download that gets no more pieces, or a job that has taken too long."""
-        if self.collecting and now >= self._piece_s:
-            self._close_file()
+        if self._file is not None and now >= self._piece_s:
+            self._close(self._file)
         elif self.job is not None and now >= self._until_s:
             limit_s = WITHIN_S.get(self.job, USUAL_S)
             self._finish(
@@ -257,26 +260,32 @@ class Jobs:
         elif self.job is not None:
             self._finish(False, f"{why}; {COPY}" if self.ended and self._waiting else why)
 
-    def _close_file(self) -> None:
-        came = sum(map(len, self._pieces))
-        whole = [piece for piece in self._pieces if len(piece) == PIECE]
-        swapped = any(len(piece) < PIECE for piece in self._pieces[:-1])
-        again = COPY if self.ended else "call again"
-        if came < self._size:
-            lost = math.ceil((self._size - came) / PIECE)
-            self._finish(False, f"{lost} pieces of {self._name} were lost; {again}")
-        elif came > self._size or len(set(whole)) < len(whole):
-            self._finish(False, f"pieces of {self._name} came twice; {again}")
-        elif swapped:
-            self._finish(False, f"pieces of {self._name} arrived in the wrong order; {again}")
+    def _close(self, file: IncomingFile) -> None:
+        first, again = self._first, COPY if self.ended else "call again"
+        if file.fault:
+            self._finish(False, f"{file.fault}; {again}")
+        elif self.ended and file.has_equal_pieces:
+            self._finish(False, f"pieces of {file.name} may have come twice; {again}")
+        elif self.job in COMPARED and first is None and not file.order_is_sure:
+            self._first, self._file = file, None
+            self._piece_s, self._waiting = math.inf, False
+        elif first is not None and first.content != file.content:
+            self._finish(
+                False,
+                f"two downloads of {file.name} differ, so pieces were lost or arrived in the"
+                f" wrong order; {again}",
+            )
         else:
-            content = b"".join(self._pieces)
-            ended = "; the server has ended and must be started again" if self.ended else ""
-            self._finish(True, f"{self._name}, {came} bytes{ended}", content=content)
+            text = f"{file.name}, {file.came} bytes"
+            if self.ended:
+                text += "; the server has ended and must be started again"
+                text += "" if file.order_is_sure else f"; {UNPROVED}"
+            self._finish(True, text, content=file.content)
 
     def _finish(self, success: bool, message: str, content: bytes = b"") -> None:
+        name = self._file.name if self._file is not None else ""
         if self.job is Job.TURN_RECORD:
-            self.turn_record = self._name, self._pieces
+            self.turn_record = name, self._file.pieces if self._file is not None else []
         else:
-            self.done.append(JobDone(self._token, success, message, self._name, content))
+            self.done.append(JobDone(self._token, success, message, name, content))
         self._clear()

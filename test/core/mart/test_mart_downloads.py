@@ -277,3 +277,80 @@ def test_a_server_that_ends_without_a_file_has_not_sent_its_log() -> None:
     assert bench.server.crashed
     assert not done.success
     assert "without sending" in done.message
+
+
+FIRST, SECOND = bytes(range(256)) * 2, bytes(reversed(range(256))) * 2
+
+
+def with_swapped_pieces(bench: MartBench) -> None:
+    """Swap FIRST and SECOND once if they arrive in one step."""
+    inner, swapped = bench.robot.advance, []
+
+    def advance() -> list[Packet]:
+        out = inner()
+        if not swapped and {FIRST, SECOND} <= {data for _, data in out}:
+            swapped.append(True)
+            a, b = out.index((0, FIRST)), out.index((0, SECOND))
+            out[a], out[b] = out[b], out[a]
+        return out
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+
+
+def test_a_file_whose_pieces_were_swapped_is_not_saved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The network swaps two full pieces of a file. Their lengths do not show this.
+
+    The driver downloads the file twice, and the contents differ. So the download fails. The next
+    one succeeds.
+    """
+    monkeypatch.setattr(FileNote, "content", FIRST + SECOND + b"end")
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    with_swapped_pieces(bench)
+    done = bench.job(Job.LAST_MOVE)
+    assert not done.success
+    assert "two downloads" in done.message
+    done = bench.job(Job.LAST_MOVE)
+    assert done.content == FIRST + SECOND + b"end", done
+
+
+def test_a_file_with_equal_pieces_is_downloaded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two full pieces of a file are equal. Nothing is lost or comes twice, so it succeeds."""
+    monkeypatch.setattr(FileNote, "content", FIRST + FIRST + b"end")
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    done = bench.job(Job.LAST_MOVE)
+    assert done.content == FIRST + FIRST + b"end", done
+
+
+@pytest.mark.parametrize("full", [1, 3])
+def test_a_file_whose_lengths_show_its_order_is_downloaded_once(
+    full: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file has one full piece and a shorter one, so its order is certain after one download.
+
+    A file with three full pieces is downloaded twice.
+    """
+    monkeypatch.setattr(FileNote, "content", full * FIRST + b"end")
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    assert bench.job(Job.LAST_MOVE).success
+    assert bench.said().count(b"LAST MOVE") == (1 if full == 1 else 2)
+
+
+@pytest.mark.parametrize("lines", [1, 40])
+def test_a_log_of_several_full_pieces_has_no_proof_of_its_order(lines: int) -> None:
+    """The server ends after it has sent its log, so the driver cannot compare two downloads.
+
+    The answer says that the order of a long log is not proved.
+    """
+    bench = MartBench().ready()
+    assert bench.job(Job.LOG).success
+    assert bench.server.log is not None
+    bench.server.log += [f"{line:60}" for line in range(lines)]
+    done = bench.job(Job.LOG_FILE)
+    assert done.success, done
+    assert ("order of its pieces is not proved" in done.message) is (lines == 40)

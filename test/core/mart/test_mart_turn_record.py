@@ -15,7 +15,8 @@ from mart_bench import MartBench
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.mart.jobs import PIECE, Job
+from omnibot_driver.core.mart.incoming_file import PIECE
+from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.turn_record import MOST, UNRECORDED, recorded_deg
 from omnibot_driver.core.mart.words import MCL, MCR
 from omnibot_driver.simulator.mart import files
