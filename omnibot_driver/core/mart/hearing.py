@@ -67,6 +67,9 @@ class Hearing(Measuring):
         answer = self.conversation.hear(reply, now)
         if answer is not None:
             self._answered(answer, now)
+        elif self.state is State.REVERSING and isinstance(reply, Ok) and reply.form is Form.NOTHING:
+            self.loop.answered_again()
+            self._predict_turn()
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply that comes after a stop command may belong to an earlier request.

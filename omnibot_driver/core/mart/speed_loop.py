@@ -132,6 +132,7 @@ class SpeedLoop(Motors):
         self._unsure = 0.0
         self.part = 0.0
         self._change = (0, 0)
+        self._copy = 0.0
         self._missed: list[tuple[int, int]] = []
         self._clear(now + SETTLE_S)
 
@@ -190,11 +191,13 @@ class SpeedLoop(Motors):
         It is computed from the current units of both motors, and from the two motor lines that the
         driver has learned. If both motors have equal units, the ratio is ``balance``.
         """
-        right, left = self._right, self._left
-        if not right.units:
+        return self._ratio(self._right.units, self._left.units)
+
+    def _ratio(self, right: int, left: int) -> float:
+        if not right:
             return 1.0
-        equal = self._mean_speed(left.units) / max(1.0, self._mean_speed(right.units))
-        return equal * self.balance
+        equal = self._mean_speed(left) / max(1.0, self._mean_speed(right))
+        return equal * self._balance(max(right, left))
 
     @property
     def balance(self) -> float:
@@ -325,6 +328,9 @@ class SpeedLoop(Motors):
         self._right.units = min(MOST_UNITS, max(0, self._right.units + right))
         self._left.units = min(MOST_UNITS, max(0, self._left.units + left))
         self._change = self._right.units - before[0], self._left.units - before[1]
+        again = self._right.units + right, self._left.units + left  # if it arrives twice
+        wrong = self._ratio(*(min(MOST_UNITS, max(1, units)) for units in again))
+        self._copy = max(self._copy, abs(wrong - self.left_over_right))
         if max(abs(right), abs(left)) >= LARGE_UNITS:
             self._clear(now + SETTLE_S)
 
@@ -335,6 +341,15 @@ class SpeedLoop(Motors):
         """
         self._unsure += MISSED * self.part**2
         self._missed = [*self._missed, self._change][-MOST_MISSED:]
+
+    def answered_again(self) -> None:
+        """Record that the server may have carried out a change twice, because it answered twice.
+
+        This may be any change of this motion since the last such reply. So the wheel speed ratio is
+        less certain by the largest effect that one of these changes would have.
+        """
+        self._unsure += self._copy**2
+        self._copy = 0.0
 
     @property
     def _is_slow(self) -> bool:

@@ -6,7 +6,7 @@ import math
 from dataclasses import astuple
 
 import pytest
-from honesty import nees
+from honesty import RARE, nees
 from mart_bench import MartBench
 
 from omnibot_driver.core.mart import MartSettings, State, parse, words
@@ -394,3 +394,29 @@ def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
     for ahead_s in (0.0, 0.1, 0.5, 2.0):
         told = odometry.told(100.0 + ahead_s, blind_since_s=None)
         assert all(map(math.isfinite, astuple(told.covariance)))
+
+
+@pytest.mark.parametrize("command", [(-0.15, 0.2), (-0.15, -0.2), (-0.2, 0.1)])
+def test_the_covariance_includes_a_change_that_is_carried_out_twice(
+    command: tuple[float, float],
+) -> None:
+    """The robot drives backward, and the network delivers the first change of the units twice.
+
+    The server changes the units twice, and answers twice. Nothing measures the turn, so the heading
+    is wrong. The second answer makes the covariance large enough for this error.
+    """
+    bench = MartBench("source").ready()
+    inner, first = bench.robot.receive, []
+
+    def receive(data: bytes, now: float, channel: int) -> None:
+        inner(data, now, channel)
+        if data.startswith(b"CS") and not first:
+            first.append(data)
+            inner(data, now, channel)
+
+    bench.robot.receive = receive  # type: ignore[method-assign]
+    bench.command(*command, 3.0)
+    bench.command(0.0, 0.0, 3.0)
+    assert first
+    assert abs(bench.error.yaw_rad) > 0.1
+    assert nees(bench) < RARE
