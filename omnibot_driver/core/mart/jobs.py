@@ -77,6 +77,11 @@ COMPARED: Final = frozenset({Job.LAST_MOVE, Job.LAST_TURN})
 
 The job succeeds only if both downloads are equal.
 """
+FILES_BEGIN: Final = {
+    Job.LAST_MOVE: "the file begins with a move: drive forward or backward, then call again",
+    Job.LAST_TURN: "the file begins with a turn: turn the robot on the spot, then call again",
+}
+"""What to do if the controller has no file of this kind."""
 UNPROVED: Final = (
     "the order of its pieces is not proved: compare it with the file on the controller, before"
     " ~/start_log deletes that file"
@@ -190,7 +195,8 @@ class Jobs:
         if job is None or self._request is None or answer.word is not self._request.word:
             return
         if isinstance(reply, Fail):
-            self._finish(False, f"the controller answers: {reply.reason or 'fail'}; call again")
+            advice = FILES_BEGIN.get(job, "call again")
+            self._finish(False, f"the controller answers: {reply.reason or 'fail'}; {advice}")
         elif reply.form is Form.FILE:
             self._file = IncomingFile(*reply.file)
             self._piece_s = now + QUIET_S
@@ -251,14 +257,16 @@ class Jobs:
             )
 
     def cancel(self, why: str) -> None:
-        """End the job as failed, for the reason ``why``.
+        """End the job as failed. ``why``: the reason, and after a semicolon what to do.
 
-        A job that the driver has begun by itself gives no result.
+        A job that the driver has begun by itself gives no result. If the server has ended, the
+        advice in ``why`` is replaced, because the request cannot be repeated.
         """
         if self.job in OWN:
             self._clear()
         elif self.job is not None:
-            self._finish(False, f"{why}; {COPY}" if self.ended and self._waiting else why)
+            ended = self.ended and self._waiting
+            self._finish(False, f"{why.partition(';')[0]}; {COPY}" if ended else why)
 
     def _close(self, file: IncomingFile) -> None:
         first, again = self._first, COPY if self.ended else "call again"

@@ -46,10 +46,13 @@ def test_the_last_move_and_turn_are_downloaded_whole() -> None:
 
 
 def test_nothing_to_download_is_told() -> None:
-    """The controller has no file to download. The job fails with the controller's reason."""
-    done = MartBench().ready().job(Job.LAST_MOVE)
-    assert not done.success
-    assert "no file available" in done.message
+    """The controller has no file to download. The job fails with the reason, and with advice."""
+    bench = MartBench().ready()
+    for job, advice in ((Job.LAST_MOVE, "drive forward"), (Job.LAST_TURN, "turn the robot")):
+        done = bench.job(job)
+        assert not done.success
+        assert "no file available" in done.message
+        assert advice in done.message
 
 
 @pytest.mark.parametrize("spoil", ["lose", "double"])
@@ -134,6 +137,23 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
     done = bench.extras(JobDone)[-1]
     assert not done.success
     assert "copy the file from the controller" in done.message
+
+
+def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() -> None:
+    """The server falls silent just before EXIT is sent.
+
+    The result asks for a copy of the file. It does not say "call again", because that cannot help.
+    """
+    bench = MartBench().ready()
+    assert bench.job(Job.LOG).success
+    bench.speaks = False
+    bench.board.ask(Job.LOG_FILE, "token", bench.now)
+    bench.run_until(lambda: b"EXIT" in bench.said(), 5.0)
+    bench.run(10.0)
+    done = bench.extras(JobDone)[-1]
+    assert not done.success
+    assert "copy the file from the controller" in done.message
+    assert "call again" not in done.message
 
 
 @pytest.mark.slow
