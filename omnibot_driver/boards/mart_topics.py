@@ -5,6 +5,7 @@
 This module only connects ROS to the session.
 """
 
+import math
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -110,14 +111,15 @@ class MartTopics:
 
     def _publish_range(self, sonar: SonarReading, stamp_ns: int) -> None:
         publisher, frame = self._ranges[sonar.side]
+        farthest = self._values["range_maximum"]
         publisher.publish(
             Range(
                 header=Header(stamp=messages.time_message(stamp_ns), frame_id=frame),
                 radiation_type=messages.RADIATION[self._values["range_type"]],
                 field_of_view=self._values["range_field_of_view"],
                 min_range=self._values["range_minimum"],
-                max_range=self._values["range_maximum"],
-                range=sonar.distance_m,
+                max_range=farthest,
+                range=sonar.distance_m if sonar.distance_m <= farthest else math.inf,
             )
         )
 

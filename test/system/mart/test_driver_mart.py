@@ -365,6 +365,19 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     assert "TF DOCK 2" in mart.do(lambda board: list(board.server.executed))
 
 
+def test_a_distance_beyond_the_maximum_is_published_as_infinite(new: New) -> None:
+    """A wall is 5 m away. Then the user sets ``range_maximum`` to 4 m: the distance is infinite."""
+    mart, _, probe = new
+    ranges = probe.listen(Range, "range/front")
+    mart.do(lambda board: setattr(board.server, "front_m", 5.0))
+    probe.wait_for(lambda: ranges and ranges[-1].range == pytest.approx(5.0, abs=0.05))
+    real = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=4.0)
+    changes = [Parameter(name="range_maximum", value=real)]
+    assert probe.call(SetParameters, "set_parameters", parameters=changes).results[0].successful
+    probe.wait_for(lambda: ranges[-1].max_range == 4.0)
+    assert ranges[-1].range == math.inf
+
+
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
     """The server at the board's address does not answer.
 
