@@ -12,7 +12,7 @@ from drives import DELAY_S, Drive, Topic
 from verdicts import said, troubles
 
 from omnibot_driver.boards.fejemis import PARAMETERS
-from omnibot_driver.tools.report import following, plots
+from omnibot_driver.tools.report import commanded, plots
 from omnibot_driver.tools.report.findings import Level
 from omnibot_driver.tools.report.judge import judge
 from omnibot_driver.tools.report.log import Log
@@ -313,7 +313,7 @@ def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
     assert log.joint_states.values[20].tolist() == [0.5, 1.0]
     assert log.wheel_cmd.values[20].tolist() == [1.0, 1.0]
     assert np.isnan(log.wheel_cmd.values[0]).tolist() == [True, True]
-    (pair,) = following.pairs(log)
+    (pair,) = commanded.pairs(log)
     assert pair.axes == ("left wheel", "right wheel")
     plots.velocities(log)
 

@@ -9,23 +9,26 @@ from typing import Final
 import numpy as np
 
 from omnibot_driver.core.reporting.status import RUNNING
+from omnibot_driver.tools.report.commanded import Pair, pairs, twists
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask, Series, Span
 
 LAGS_S: Final = np.arange(0.0, 0.62, 0.02)
 TOLERANCE: Final = 0.1
+STEADY_S: Final = 1.5
+"""Time in s for which a command must be constant before it is compared with the measured motion.
+
+Until then, the motors may still be changing their speed.
+"""
+CONSTANT: Final = 0.02
+"""Relative change of a command up to which the command is regarded as constant."""
+REVERSED: Final = -0.5
+"""Ratio of measured to commanded motion below which a robot moves the wrong way, also if its
+commands were never constant."""
 TOLD: Final = 0.05
 """Speed of a wheel's rim, in m/s, above which a command or a measurement is regarded as motion.
 
 Friction may prevent slower motions.
-"""
-YAW_WEIGHT_M: Final = 0.143
-WHEEL_WEIGHT_M: Final = 0.029
-"""Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
-
-The factors fit an OmniBot, but they are used for all robots. This is accurate enough, because they
-have only two uses. They decide which speeds are motion, and how much each axis counts in the search
-for the lag. They do not change the reported ratios of measured to commanded motion.
 """
 STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
@@ -33,93 +36,6 @@ SUSTAINED_S: Final = 1.0
 AFTER_STOP_S: Final = 1.5
 """Time in s within which the robot must come to rest after an e-stop, or after the last command has
 timed out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """A topic, its commands, and the measurements of the motion that they command.
-
-    ``weights``: for each axis, the factor that converts a value to the speed of a wheel's rim in
-    m/s.
-    ``scales``: for each axis, the driver's parameter to change if commands and measurements differ.
-    """
-
-    topic: str
-    axes: tuple[str, ...]
-    units: tuple[str, ...]
-    weights: tuple[float, ...]
-    scales: tuple[str, ...]
-    commands: Series
-    measured: Series
-
-
-def twists(log: Log) -> Pair:
-    """Return the commands on cmd_vel and the twists in odom. Both contain only finite values."""
-    odom = _sampled(log.odom)
-    linear, angular = _scales(log)
-    scales = linear, linear, angular
-    return Pair(
-        "cmd_vel",
-        ("vx", "vy", "yaw rate"),
-        ("m/s", "m/s", "rad/s"),
-        (1.0, 1.0, YAW_WEIGHT_M),
-        scales,
-        log.cmd_vel.only(log.cmd_vel.finite),
-        Series(odom.arrived_s, odom.stamp_s, odom.values[:, 3:]),
-    )
-
-
-def _scales(log: Log) -> tuple[str, str]:
-    """Return the names of the parameters that scale linear and angular speed.
-
-    For a robot with two wheels, these parameters scale the odometry. For other robots, they scale
-    the commands.
-    """
-    if log.two_wheels:
-        return "odom_linear_scale", "odom_angular_scale"
-    return "linear_scale", "angular_scale"
-
-
-def pairs(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements for cmd_vel and for wheel_cmd.
-
-    A pair is left out if the log lacks its commands or its measurements. All values are finite.
-    """
-    count = len(log.wheels)
-    wheels = Pair(
-        "wheel_cmd",
-        tuple(map(wheel_name, log.wheels)),
-        ("rad/s",) * count,
-        (WHEEL_WEIGHT_M,) * count,
-        _scales(log)[:1] * count,
-        log.wheel_cmd.only(log.wheel_cmd.finite),
-        _sampled(log.joint_states),
-    )
-    return [pair for pair in (twists(log), wheels) if len(pair.commands) and len(pair.measured) > 1]
-
-
-def wheel_name(joint: str) -> str:
-    """Return the name of a wheel as the report shows it, such as "wheel A" or "left wheel"."""
-    words = joint.removesuffix("_joint").split("_")
-    return " ".join(word.upper() if len(word) == 1 else word for word in words)
-
-
-def shown(log: Log) -> list[Pair]:
-    """Return what to draw: pairs of commands and measurements.
-
-    If the log has no commands, the only pair has the measurements of odom.
-    """
-    return pairs(log) or [twists(log)]
-
-
-def _sampled(series: Series) -> Series:
-    """Return the finite rows that have a timestamp, with timestamps by the recorder's clock.
-
-    The times of commands, states and e-stops are by the same clock, so the rows can be compared
-    with them.
-    """
-    rows = series.only(series.finite & np.isfinite(series.stamp_s))
-    return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,18 +47,34 @@ class Answer:
     ``gains``: for each axis, measured / commanded motion; NaN if unknown.
 
     ``error``: for each axis, rms of measured - gain · commanded motion.
+
+    ``spread``: for each axis, ``error`` divided by the rms of the command. It is infinite if the
+    command was not constant for long enough. The gain then depends on how fast the motors react.
     """
 
     lag_s: float
     gains: Array
     error: Array
+    spread: Array
+
+    @property
+    def off(self) -> Mask:
+        """For each axis, whether the gain is not 1."""
+        return np.abs(self.gains - 1.0) > TOLERANCE
+
+    @property
+    def wrong(self) -> Mask:
+        """For each axis, whether the gain is not 1 for another reason than slow motors."""
+        clear = np.abs(self.gains - 1.0) > TOLERANCE + self.spread
+        return np.asarray(clear | (self.gains < REVERSED))
 
 
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
     ``usable``: for each measurement, whether to use it. The returned delay is the one with which
-    commands and measurements fit best.
+    commands and measurements fit best. The gain of an axis is taken from constant commands, if
+    there are any.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -159,10 +91,24 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
             best_s, least = float(lag_s), error
     told = pair.commands.held(times_s - best_s)
     enough = np.sqrt(((told * weights) ** 2).mean(axis=0)) > 0.1 * TOLD
-    power = (told**2).sum(axis=0)
-    gains = np.where(enough, (told * values).sum(axis=0) / np.where(enough, power, 1.0), np.nan)
-    errors = np.sqrt(((values - np.nan_to_num(gains, nan=1.0) * told) ** 2).mean(axis=0))
-    return Answer(best_s, gains, errors)
+    rows = _constant(pair.commands, times_s) & (np.abs(told) * weights > 0.1 * TOLD)
+    steady = rows.sum(axis=0) * np.median(np.diff(times_s, append=np.inf)) >= SUSTAINED_S
+    rows |= ~steady
+    power = np.where(enough, (told**2).sum(axis=0, where=rows), np.nan)
+    gains = (told * values).sum(axis=0, where=rows) / power
+    rest = values - np.nan_to_num(gains, nan=1.0) * told
+    errors = np.sqrt((rest**2).mean(axis=0, where=rows))
+    spread = np.where(steady, errors / np.sqrt(power / rows.sum(axis=0)), np.inf)
+    return Answer(best_s, gains, errors, spread)
+
+
+def _constant(commands: Series, at_s: Array) -> Mask:
+    """Return, for each time and each axis, whether the command was constant just before."""
+    now = commands.held(at_s)
+    constant = np.ones(now.shape, dtype=bool)
+    for ago_s in np.arange(0.05, STEADY_S, 0.05):
+        constant &= np.abs(commands.held(at_s - ago_s) - now) <= CONSTANT * np.abs(now)
+    return constant
 
 
 def judge(log: Log) -> Iterator[Finding]:
@@ -287,18 +233,32 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
         f"The robot follows {pair.topic} with a lag of {1e3 * found.lag_s:.0f} ms. Measured divided"
         f" by commanded velocity: {figures}"
     )
-    off = [axis for axis in told if abs(found.gains[axis] - 1.0) > TOLERANCE]
-    if not off:
+    wrong = [axis for axis in told if found.wrong[axis]]
+    unclear = [pair.axes[axis] for axis in told if found.off[axis] and not found.wrong[axis]]
+    if unclear and not wrong:
+        yield Finding(
+            Level.NOTE,
+            "Commands",
+            f"{figure}. The speed was not constant for long enough to judge {', '.join(unclear)}.",
+            "To judge this, record a drive with constant commands of 6 s each.",
+        )
+        return
+    if not wrong:
         yield Finding(Level.GOOD, "Commands", f"{figure}.")
         return
-    if any(found.gains[axis] < -TOLERANCE for axis in off):
+    if any(found.gains[axis] < -TOLERANCE for axis in wrong):
         advice = (
             "The robot moves the wrong way: check the wiring of the motors and the encoders."
             if log.two_wheels
             else "The robot moves the wrong way: set axis_signs (docs/commissioning.md)."
         )
+    elif log.two_wheels:
+        advice = (
+            "If the commands are within the limits max_…, check a drive with a tape measure"
+            " (calibrate scale). Only this shows whether odom or the speed of the motors is wrong."
+        )
     else:
-        scales = sorted({pair.scales[axis] for axis in off})
+        scales = sorted({pair.scales[axis] for axis in wrong})
         advice = (
             f"If the commands are within the limits max_…, divide {' and '.join(scales)} by these"
             " ratios. Then check a drive with a tape measure."

@@ -12,7 +12,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from omnibot_driver.tools.report import following, plots
+from omnibot_driver.tools.report import commanded, plots
 from omnibot_driver.tools.report.findings import Finding, Level, headline, span
 from omnibot_driver.tools.report.log import Log
 
@@ -42,7 +42,7 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "velocities",
         "Velocities",
         plots.velocities,
-        lambda log: len(following.shown(log)[0].measured),
+        lambda log: len(commanded.shown(log)[0].measured),
         "A command is drawn until the next one, but for at most 0.5 s (the default of"
         " cmd_vel_timeout). After this time the picture shows zero.",
     ),

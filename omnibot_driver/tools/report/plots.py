@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from omnibot_driver.tools.report import events, following, rhythm, sensing, travel
+from omnibot_driver.tools.report import commanded, events, rhythm, sensing, travel
 from omnibot_driver.tools.report.drawing import (
     COMMAND,
     GREY,
@@ -92,7 +92,7 @@ def path(log: Log) -> Figure:
 
 def velocities(log: Log) -> Figure:
     """Draw commanded and measured velocities, one plot for each axis."""
-    found = following.shown(log)
+    found = commanded.shown(log)
     rows = sum(len(pair.axes) for pair in found)
     figure = new_figure(1.9 * rows)
     grid = np.atleast_1d(figure.subplots(rows, 1, sharex=True))
