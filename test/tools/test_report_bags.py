@@ -104,6 +104,7 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
         log = log_of(bag, drive.namespace[1:])
         np.testing.assert_array_equal(log.imu.values, drive.imu.values)
         assert not log.alone
+        assert {"imu/data_raw", "odom", "state", "/diagnostics"} <= {*log.topics}
 
 
 def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from verdicts import said, troubles
 
 from omnibot_driver.tools.report.findings import Level, headline
 from omnibot_driver.tools.report.judge import judge
+from omnibot_driver.tools.report.log import Log
 
 
 @pytest.fixture
@@ -288,6 +289,75 @@ def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
     (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
     assert "while no other robot publishes on it" in gap.advice
     assert any("of several robots, on /dev/ttyUSB0" in finding.text for finding in findings)
+
+
+OMNIBOT = {"IMU rate (Hz)": "100.0 of 100", "Odometry rate (Hz)": "25.0 of 25"}
+MART = {"Odometry rate (Hz)": "4.9 of 5", "Published odometry (Hz)": "20"}
+
+
+def beside(drive: Drive, *streams: dict[str, str]) -> Log:
+    """Return the log of ``drive`` among several robots, with these diagnostics of all of them."""
+    drive.statuses[:] = [(1.5, "omnibot_driver: Stream", 0, "complete", one) for one in streams]
+    return replace(drive.log(), alone=False)
+
+
+def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
+    """A recording has an OmniBot and a MART, whose odometry has different rates.
+
+    The report gives the measured rate of each, and does not say what it should be. The rate of the
+    IMU can only belong to the robot with an IMU.
+    """
+    for name in ("stamp_s", "values", "late_s"):
+        setattr(drive.odom, name, getattr(drive.odom, name)[::2])
+    found = judge(beside(drive, OMNIBOT, MART))
+    (odom,) = [one for one in found if one.text.startswith("The rate of odom")]
+    assert odom.level is Level.NOTE
+    assert "is 12.50 Hz. The recording does not show what it should be." in odom.text
+    assert any("imu/data_raw is 100.00 Hz; it should be 100 Hz" in one.text for one in found)
+
+
+def test_robots_of_the_same_kind_have_the_same_expected_rate(drive: Drive) -> None:
+    """A recording has two MARTs, and one of them sends too much. The report finds it."""
+    found = judge(beside(drive, MART, MART))
+    (odom,) = [one for one in found if one.text.startswith("The rate of odom")]
+    assert odom.level is Level.WARN
+    assert "it should be 20 Hz" in odom.text
+
+
+@pytest.mark.parametrize(
+    ("streams", "topics", "level"),
+    [
+        ((OMNIBOT, MART), ("odom",), Level.NOTE),
+        ((OMNIBOT, MART), ("odom", "imu/data_raw"), Level.BAD),
+        ((OMNIBOT, OMNIBOT), ("odom",), Level.BAD),
+        ((MART, MART), ("odom",), None),
+    ],
+)
+def test_the_imu_of_another_robot_is_not_expected(
+    drive: Drive,
+    streams: tuple[dict[str, str], ...],
+    topics: tuple[str, ...],
+    level: Level | None,
+) -> None:
+    """A robot sent no message of an IMU, and there is another robot.
+
+    If only one of the two has an IMU, only a topic shows that it is this robot. This is also true
+    if the other robot has only diagnostics in the recording.
+    """
+    drive.imu.drop(0.0, 99.0)
+    for alone in (False, True):
+        log = replace(beside(drive, *streams), topics=topics, alone=alone)
+        found = [one.level for one in judge(log) if one.subject == "Recording"]
+        assert found == ([] if level is None else [level])
+
+
+def test_no_rate_of_an_omnibot_is_expected_of_two_wheels(drive: Drive) -> None:
+    """A recording of a robot with two wheels has no diagnostics. The rate gets no verdict."""
+    drive.statuses.clear()
+    drive.joints.values = drive.joints.values[:, :2]
+    found = judge(replace(drive.log(), wheels=("left_wheel_joint", "right_wheel_joint")))
+    (odom,) = [one for one in found if one.text.startswith("The rate of odom")]
+    assert odom.level is Level.NOTE
 
 
 def test_topics_that_are_missing_are_named(drive: Drive) -> None:

@@ -60,7 +60,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
     if not recorder.count:
         why = "; ".join(troubles) or "the topics of this robot are empty"
         raise ToolError(f"{path} has no message of the robot {robot}: {why}")
-    return recorder.log(tuple(troubles), alone=len(robots) == 1)
+    return recorder.log(tuple(troubles), topics=topics.values(), alone=len(robots) == 1)
 
 
 def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:

@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator
 
-from omnibot_driver.tools.report import events, following, rhythm, sensing, travel
+from omnibot_driver.tools.report import events, following, rhythm, sensing, streams, travel
 from omnibot_driver.tools.report.findings import Finding, Level
 from omnibot_driver.tools.report.log import Log
 
@@ -26,16 +26,18 @@ def judge(log: Log) -> list[Finding]:
 def _all(log: Log) -> Iterator[Finding]:
     for trouble in log.troubles:
         yield Finding(Level.BAD, "Recording", f"{trouble[:1].upper()}{trouble[1:]}.")
-    absent = set(log.absent)
-    if _has_no_imu(log):
-        absent.discard(IMU)
     for topic, consequence in WITHOUT.items():
-        if topic in absent:
+        level = _missing_imu(log) if topic == IMU else Level.BAD
+        if topic in log.absent and level > Level.GOOD:
             yield Finding(
-                Level.BAD,
+                level,
                 "Recording",
-                f"No message of {topic}: {consequence}.",
-                "Record this topic as well (ros2 bag record --all), while the state is nominal.",
+                f"No message of {topic}: {consequence}."
+                if level is Level.BAD
+                else f"No topic {topic}. If this robot has an IMU, the recording lacks it.",
+                "Record this topic as well (ros2 bag record --all), while the state is nominal."
+                if level is Level.BAD
+                else "",
             )
     others = [topic for topic in log.absent if topic in ("state", "estop_active", "/diagnostics")]
     if others:
@@ -48,19 +50,24 @@ def _all(log: Log) -> Iterator[Finding]:
         )
     yield from events.judge(log)
     if len(log.imu):
-        yield from rhythm.judge(log, log.imu, rhythm.IMU)
+        yield from rhythm.judge(log, log.imu, streams.IMU)
     if len(log.odom):
-        yield from rhythm.judge(log, log.odom, rhythm.ODOMETRY)
+        yield from rhythm.judge(log, log.odom, streams.ODOMETRY)
     yield from following.judge(log)
     yield from travel.judge(log)
     yield from sensing.judge(log)
 
 
-def _has_no_imu(log: Log) -> bool:
-    """Return whether the diagnostics show that the board has no IMU.
+def _missing_imu(log: Log) -> Level:
+    """Return how severe it is that the log has no message of the IMU; GOOD if the board has none.
 
-    For a board with an IMU, the driver's Stream status has values for the IMU. The board has no IMU
-    if Stream statuses were recorded, and none of them has such a value.
+    For a board with an IMU, the driver's Stream status has values for the IMU. If there are several
+    robots, with and without an IMU, the status does not show which of them has it. Then only a
+    topic shows that this robot has an IMU.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
-    return bool(streams) and not any("IMU" in key for item in streams for key in item.values)
+    told = {any("IMU" in key for key in status.values) for status in streams}
+    if told == {False}:
+        return Level.GOOD
+    known = told == {True} or IMU in log.topics or (log.alone and not told)
+    return Level.BAD if known else Level.NOTE

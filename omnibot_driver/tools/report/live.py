@@ -55,15 +55,19 @@ def listen(
         node = rclpy.create_node("omnibot_report")
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        robot, topics, kinds, alone = _discover(node, executor, namespace, asked_to_end)
+        robot, topics, kinds = _discover(node, executor, namespace, asked_to_end)
         recorder = Recorder(robot)
         for topic, role in topics.items():
             _subscribe(node, recorder, topic, role, kinds[topic])
+        published = [role for topic, role in topics.items() if node.count_publishers(topic)]
         began_s = time.monotonic()
         while (spent_s := time.monotonic() - began_s) < seconds and not asked_to_end():
             progress(int(spent_s), int(seconds))
             executor.spin_once(timeout_sec=0.1)
         progress(int(seconds), int(seconds))
+        # Other robots may be discovered late, so they are counted at the end.
+        kinds = {topic: types[0] for topic, types in node.get_topic_names_and_types()}
+        alone = {*_robots(node, kinds)} <= {robot}
     except ExternalShutdownException as error:
         raise ToolError("ROS was shut down during the recording") from error
     finally:
@@ -72,7 +76,7 @@ def listen(
         raise ToolError(
             f"the driver of {robot} sent nothing for {spent_s:.1f} s: is it still running?"
         )
-    return recorder.log(alone=alone)
+    return recorder.log(topics=published, alone=alone)
 
 
 def _discover(
@@ -80,11 +84,8 @@ def _discover(
     executor: SingleThreadedExecutor,
     namespace: str | None,
     asked_to_end: Callable[[], bool],
-) -> tuple[str, Topics, dict[str, str], bool]:
-    """Find the robot; return its namespace, its topics, the types of all topics, and "alone".
-
-    "alone" is True if no other robot was found.
-    """
+) -> tuple[str, Topics, dict[str, str]]:
+    """Find the robot; return its namespace, its topics, and the types of all topics."""
     began_s = time.monotonic()
     while True:
         executor.spin_once(timeout_sec=0.1)
@@ -92,13 +93,7 @@ def _discover(
         if spent_s < LOOK_ROUND_S and not asked_to_end():
             continue
         kinds = {topic: types[0] for topic, types in node.get_topic_names_and_types()}
-        robots = {
-            name: topics
-            for name, topics in find(kinds.items()).items()
-            if any(
-                node.count_publishers(topic) for topic, role in topics.items() if role == "state"
-            )
-        }
+        robots = _robots(node, kinds)
         try:
             robot, topics = choose(robots, namespace, "ROS")
         except ToolError as error:
@@ -113,7 +108,16 @@ def _discover(
                 " same ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as this"
                 f" program{discovery_advice()}"
             ) from error
-        return robot, topics, kinds, len(robots) == 1
+        return robot, topics, kinds
+
+
+def _robots(node: Node, kinds: dict[str, str]) -> dict[str, Topics]:
+    """Return the topics of each robot whose driver runs. ``kinds``: the types of all topics."""
+    return {
+        name: topics
+        for name, topics in find(kinds.items()).items()
+        if any(node.count_publishers(topic) for topic, role in topics.items() if role == "state")
+    }
 
 
 def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str) -> None:

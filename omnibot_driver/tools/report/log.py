@@ -119,6 +119,8 @@ class Log:
 
     ``absent``: topics without a message.
 
+    ``topics``: topics that exist, also those without a message, if known.
+
     ``alone``: whether everything in /diagnostics belongs to this robot.
     """
 
@@ -135,6 +137,7 @@ class Log:
     estops: tuple[Span, ...] = ()
     diagnostics: tuple[Status, ...] = ()
     absent: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
     troubles: tuple[str, ...] = ()
     alone: bool = True
 

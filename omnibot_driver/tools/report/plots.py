@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from omnibot_driver.tools.report import commanded, events, rhythm, sensing, travel
+from omnibot_driver.tools.report import commanded, events, rhythm, sensing, streams, travel
 from omnibot_driver.tools.report.drawing import (
     COMMAND,
     GREY,
@@ -176,7 +176,7 @@ def timing(log: Log) -> Figure:
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
     names: list[tuple[str, str]] = []
     told: tuple[list[tuple[Array, Array]], ...] = ([], [])
-    for stream, series, colour in ((rhythm.IMU, log.imu, X), (rhythm.ODOMETRY, log.odom, Y)):
+    for stream, series, colour in ((streams.IMU, log.imu, X), (streams.ODOMETRY, log.odom, Y)):
         found = rhythm.measure(log, series, stream)
         if len(found.steps_s):
             names.append((stream.name, colour))
@@ -210,7 +210,7 @@ def timeline(log: Log) -> Figure:
     """Draw state, e-stop, commands, gaps, and each status of /diagnostics as bands over time."""
     gaps = [
         (f"gaps in {stream.name}", rhythm.measure(log, series, stream))
-        for stream, series in ((rhythm.IMU, log.imu), (rhythm.ODOMETRY, log.odom))
+        for stream, series in ((streams.IMU, log.imu), (streams.ODOMETRY, log.odom))
         if len(series) > 1
     ]
     names = list(dict.fromkeys((status.hardware_id, status.name) for status in log.diagnostics))

@@ -8,7 +8,7 @@ Messages from a bag and from rclpy have the same fields.
 import math
 from array import array
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -154,8 +154,12 @@ class Recorder:
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
-    def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
+    def log(
+        self, troubles: tuple[str, ...] = (), *, topics: Iterable[str] = (), alone: bool = True
+    ) -> Log:
         """Return a log of all messages, in the order of arrival.
+
+        ``topics``: the roles whose topics exist.
 
         There must be at least one message.
         """
@@ -187,6 +191,7 @@ class Recorder:
             ),
             diagnostics=self._statuses(start_ns),
             absent=(*absent, *(name for name, events in self._events.items() if not events)),
+            topics=tuple(topics),
             troubles=troubles,
             alone=alone,
         )

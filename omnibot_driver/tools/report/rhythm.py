@@ -2,19 +2,18 @@
 
 """Judges a topic's timing: rate, even timestamps, missing messages, and delays of arrival."""
 
+import math
 from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from omnibot_driver.core.reporting.diagnosis import PUBLISHED_ODOMETRY
-from omnibot_driver.core.reporting.status import RUNNING
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import OTHER_CLOCK_S, Array, Log, Series, Span
+from omnibot_driver.tools.report.streams import Stream
 
 GAP: Final = 1.5
 """Step between two timestamps, in periods, above which a message may be missing."""
@@ -32,59 +31,6 @@ RECOVERY_S: Final = 0.75
 
 If short steps compensate the long step within this time, the timestamps have jumped. If not,
 messages are regarded as missing.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class Stream:
-    """The expected timing of a topic.
-
-    ``running``: the states of the driver in which the driver publishes the topic.
-
-    ``lost``: keys of those values in the driver's diagnostics that count lost messages.
-
-    ``rates``: keys under which the driver's diagnostics may contain the rate of the topic. The
-    first key that has a value is used.
-    """
-
-    name: str
-    rate_hz: float
-    running: tuple[str, ...]
-    lost: tuple[str, ...]
-    rates: tuple[str, ...]
-
-    def promised(self, log: Log) -> "Stream":
-        """Return this stream with the expected rate from the driver's diagnostics.
-
-        If the diagnostics contain no rate, return the stream unchanged.
-        """
-        if not log.alone:
-            return self
-        for key in self.rates:
-            told = [status.values[key] for status in log.diagnostics if key in status.values]
-            with suppress(ValueError):
-                if told and (rate_hz := float(told[-1].rpartition(" of ")[2])) > 0.0:
-                    return replace(self, rate_hz=rate_hz)
-        return self
-
-
-IMU: Final = Stream(
-    "imu/data_raw",
-    100.0,
-    RUNNING,
-    lost=("IMU frames lost", "IMU readings refused"),
-    rates=("IMU rate (Hz)",),
-)
-ODOMETRY: Final = Stream(
-    "odom",
-    25.0,
-    ("nominal",),
-    lost=("Odometry frames lost", "Odometry readings refused"),
-    rates=(PUBLISHED_ODOMETRY, "Odometry rate (Hz)"),
-)
-"""The expected timing of the odometry.
-
-If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 """
 
 
@@ -117,7 +63,6 @@ class FrameSchedule:
 
 def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
     """Return the timing of a topic by its timestamps. Messages without a timestamp are left out."""
-    stream = stream.promised(log)
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
     period_s = float(np.median(steps_s)) if len(steps_s) else 1.0 / stream.rate_hz
@@ -181,8 +126,8 @@ def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
 
 def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
     """Judge the timing of a topic: rate, uneven timestamps, gaps, and delays of arrival."""
-    stream = stream.promised(log)
     rhythm = measure(log, series, stream)
+    stream = stream.promised(log)
     unstamped = int(np.isnan(series.stamp_s).sum())
     if unstamped:
         yield Finding(
@@ -227,19 +172,8 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     if len(even) < FEWEST:
         return
     rate_hz, jitter_s = 1.0 / float(even.mean()), float(even.std())
-    off = abs(rate_hz / stream.rate_hz - 1.0) > RATE_TOLERANCE
     uneven = jitter_s > UNEVEN * rhythm.period_s
-    yield Finding(
-        Level.WARN if off else Level.GOOD,
-        "Timing",
-        f"The rate of {stream.name} is {rate_hz:.2f} Hz; it should be {stream.rate_hz:g} Hz.",
-        (
-            "Possible causes are two publishers, a filter in between, or a recorder that drops many"
-            " messages."
-        )
-        if off
-        else "",
-    )
+    yield _rate(rate_hz, stream)
     yield Finding(
         Level.WARN if uneven else Level.GOOD,
         "Timing",
@@ -247,6 +181,27 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         "So some stamps are not the sampling times. The status “Time” in /diagnostics may name the"
         " cause; docs/internals/time.md explains how stamps are made."
         if uneven
+        else "",
+    )
+
+
+def _rate(rate_hz: float, stream: Stream) -> Finding:
+    figure = f"The rate of {stream.name} is {rate_hz:.2f} Hz"
+    if math.isnan(stream.rate_hz):
+        return Finding(
+            Level.NOTE,
+            "Timing",
+            f"{figure}. The recording does not show what it should be.",
+            "Record /diagnostics too, while no other robot publishes on it.",
+        )
+    off = abs(rate_hz / stream.rate_hz - 1.0) > RATE_TOLERANCE
+    return Finding(
+        Level.WARN if off else Level.GOOD,
+        "Timing",
+        f"{figure}; it should be {stream.rate_hz:g} Hz.",
+        "Possible causes are two publishers, a filter in between, or a recorder that drops many"
+        " messages."
+        if off
         else "",
     )
 
