@@ -2,6 +2,7 @@
 
 """Tests that a finished measurement is kept if its result cannot be drawn, saved or printed."""
 
+import io
 import os
 import signal
 import sys
@@ -129,6 +130,34 @@ def test_a_broken_pipe_loses_nothing(
         monkeypatch.setattr(sys, "stdout", gone)
         assert ending() == 1
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
+
+
+def test_a_full_disk_for_the_output_loses_nothing(
+    ending: Ending,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The output goes to a disk that is full.
+
+    The result is still saved, and one sentence says why the program ends.
+    """
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert ending() == 1
+    assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("calibrate: the output cannot be written: ")
+
+
+def test_a_terminal_that_knows_only_ascii_gets_the_result(
+    ending: Ending, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The output is in ASCII. The table has ? for other characters, such as ±."""
+    printed = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(printed, encoding="ascii"))
+    assert ending() == 0
+    assert b"71.3" in printed.getvalue()
 
 
 def test_what_is_to_be_copied_stands_on_one_line(

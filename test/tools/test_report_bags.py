@@ -5,6 +5,7 @@
 The report rejects a file that it cannot read.
 """
 
+import io
 import os
 import subprocess
 import sys
@@ -221,3 +222,29 @@ def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path
         os.close(writer)
     assert (done.returncode, done.stderr) == (0, "")
     assert "Healthy." in (tmp_path / "bag_report/report.html").read_text()
+
+
+def test_a_full_disk_for_the_output_is_told_in_one_sentence(
+    drive: Drive,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The output goes to a disk that is full. The message says where the report is."""
+    bag = write(tmp_path / "bag", [drive])
+    with Path("/dev/full").open("w", encoding="utf-8") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        assert main([str(bag), "--output", str(tmp_path / "out")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "output cannot be written" in line
+    assert line.endswith(f"the report is in {tmp_path}/out/report.html")
+
+
+def test_a_terminal_that_knows_only_ascii_gets_the_verdict(
+    drive: Drive, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The output is in ASCII. The report prints ? for other characters, such as ±."""
+    bag, printed = write(tmp_path / "bag", [drive]), io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(printed, encoding="ascii"))
+    assert main([str(bag), "--output", str(tmp_path / "out")]) in (0, 3)
+    assert b"m/s?" in printed.getvalue()

@@ -14,6 +14,7 @@ from typing import Final
 
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
+from omnibot_driver.tools.printing import replace_unprintable
 from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
@@ -30,6 +31,7 @@ def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) 
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)
+    replace_unprintable()
     try:
         with Interruption() as interruption:
             from omnibot_driver.tools.calibrate.arguments import command_line

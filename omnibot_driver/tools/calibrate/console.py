@@ -14,6 +14,7 @@ from rich.table import Table
 
 from omnibot_driver.tools.calibrate.result import Finding
 from omnibot_driver.tools.needs import ToolError
+from omnibot_driver.tools.printing import printing
 
 T = TypeVar("T")
 
@@ -43,11 +44,11 @@ class Console:
 
     def say(self, text: str = "") -> None:
         """Print a paragraph."""
-        self.rich.print(text, markup=False)
+        self._print(text)
 
     def line(self, text: str) -> None:
         """Print one line without wrapping, so that the user can copy it."""
-        self.rich.print(text, markup=False, soft_wrap=True)
+        self._print(text, soft_wrap=True)
 
     def confirm(self, question: str) -> None:
         """Ask for a confirmation. Raises ToolError if the answer is not yes."""
@@ -111,7 +112,11 @@ class Console:
         for one in findings:
             value, sigma, before = digits(one)
             table.add_row(one.name, value, sigma, one.unit, before)
-        self.rich.print(table)
+        self._print(table)
+
+    def _print(self, content: str | Table, *, soft_wrap: bool = False) -> None:
+        with printing():
+            self.rich.print(content, markup=False, soft_wrap=soft_wrap)
 
     def _answer(self, question: str) -> str:
         try:

@@ -3,7 +3,6 @@
 """Command line of the monitor: ``ros2 run omnibot_driver monitor``."""
 
 import argparse
-import io
 import os
 import sys
 import time
@@ -17,6 +16,7 @@ from omnibot_driver.tools.monitor.rates import WINDOW_S
 from omnibot_driver.tools.monitor.screen import has_screen
 from omnibot_driver.tools.monitor.teleop import DeadMan
 from omnibot_driver.tools.needs import ToolError, need
+from omnibot_driver.tools.printing import discard_output, printing, replace_unprintable
 from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 if TYPE_CHECKING:
@@ -29,8 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the monitor; return 0, or 1 after an error on stderr. Exit with code 2 on wrong usage."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options, ros_arguments = _parse(arguments)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # prints ? for characters that the encoding lacks
+    replace_unprintable()
     try:
         return _run(options, ros_arguments)
     except ToolError as error:
@@ -38,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("monitor: interrupted", file=sys.stderr)
     except BrokenPipeError:  # the pipe's reader has ended
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard_output()
     return 1
 
 
@@ -170,17 +169,12 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
             f"these values are NaN or infinite: {', '.join(strange)}; before you drive, fix the"
             " node that publishes such values"
         )
-    try:
+    with printing():
         print(
             text.as_json(view, troubles) if as_json else text.report(view),
             end="\n" if as_json else "",
             flush=True,
         )
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        raise ToolError(f"the output cannot be written: {error}") from error
     for trouble in troubles:
         print(f"monitor: {trouble}", file=sys.stderr)
     return 1 if troubles else 0

@@ -3,7 +3,6 @@
 """Command line of the report: ``python -m omnibot_driver.tools.report BAG``."""
 
 import argparse
-import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from omnibot_driver.files import unused
 from omnibot_driver.tools.needs import ToolError, need
+from omnibot_driver.tools.printing import discard_output, printing, replace_unprintable
 
 if TYPE_CHECKING:
     from omnibot_driver.tools.report.bag import Progress
@@ -114,9 +114,12 @@ def _report(wanted: argparse.Namespace) -> int:
     except OSError as error:
         raise ToolError(f"{folder} cannot be written: {error}") from error
     try:
-        print(f"{page.text(findings)}\n\n{written}", flush=True)
+        with printing():
+            print(f"{page.text(findings)}\n\n{written}", flush=True)
     except BrokenPipeError:  # the pipe's reader has ended; the files are written
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        discard_output()
+    except ToolError as error:
+        raise ToolError(f"{error}; the report is in {written}") from error
     return WRONG if any(finding.level is Level.BAD for finding in findings) else 0
 
 
@@ -125,6 +128,7 @@ def main(given: list[str] | None = None) -> int:
 
     Return 1 if there is nothing to report on. Exit with code 2 on wrong usage.
     """
+    replace_unprintable()
     try:
         return _report(arguments(given))
     except ToolError as error:
