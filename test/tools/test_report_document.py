@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from omnibot_driver.core.imu.scale import ACCEL_TOLERANCE
-from omnibot_driver.tools.report import events, following, log, rhythm, sensing, travel
+from omnibot_driver.tools.report import clocks, events, following, log, rhythm, sensing, travel
 
 ROOT = Path(__file__).parents[2]
 DOCUMENT = (ROOT / "docs/tools/report.md").read_text()
@@ -32,6 +32,7 @@ def test_every_subject_has_a_row() -> None:
 @pytest.mark.parametrize(
     ("subject", "limit"),
     [
+        ("Recording", f"{clocks.LEAST_STEP_S:g} s"),
         ("State", f"{100 * events.LONG_OUT_OF_REACH:g} %"),
         ("E-stop", f"{following.AFTER_STOP_S:g} s"),
         ("Timing", f"{100 * rhythm.RATE_TOLERANCE:g} %"),
@@ -40,6 +41,7 @@ def test_every_subject_has_a_row() -> None:
         ("Gaps", f"{rhythm.LONG_GAP_S:g} s or {100 * rhythm.MANY_LOST:g} %"),
         ("Commands", f"{log.COMMAND_TIMEOUT_S:g} s in motion"),
         ("Commands", f"{100 * following.TOLERANCE:g} %"),
+        ("Commands", f"constant for {following.STEADY_S:g} s"),
         ("Commands", f"for {following.SUSTAINED_S:g} s"),
         ("Odometry", f"{travel.LEAP_M:g} m or {travel.LEAP_RAD:g} rad"),
         ("IMU", f"{100 * sensing.SLIGHT_ERROR:g} %"),

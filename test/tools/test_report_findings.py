@@ -227,6 +227,46 @@ def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: flo
     assert all("after its stamp" in finding.text for finding in found), found
 
 
+@pytest.mark.parametrize("by_s", [3.65e9, -3600.0, -3.0, 0.5])
+def test_a_step_of_the_recorders_clock_is_told_and_is_no_delay(by_s: float) -> None:
+    """The clock of the recording computer is set during the drive, so it steps.
+
+    The report has one finding about this step, and no other trouble. It does not say that messages
+    wait, or that the robot moved without a command.
+    """
+    drive = Drive()
+    for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):
+        topic.late_s = topic.late_s + by_s * (topic.stamp_s > 8.0)
+    arrived_s = [drive.imu.stamp_s + drive.imu.late_s, drive.odom.stamp_s + drive.odom.late_s]
+    log = replace(drive.log(), duration_s=float(np.concatenate(arrived_s).max()))
+    (found,) = [finding for finding in judge(log) if finding.level > Level.NOTE]
+    assert "The recorder's clock stepped" in found.text
+    assert f"{'forward' if by_s > 0.0 else 'back'} by" in found.text
+    assert "8.0 s after the first message" in found.text
+
+
+def test_a_step_of_the_drivers_clock_is_told_as_that() -> None:
+    """The clock of the driver's computer steps forward by an hour.
+
+    The clock of the recorder does not step. The report names the driver's clock.
+    """
+    drive = Drive()
+    for topic in (drive.imu, drive.odom, drive.joints):
+        rows = topic.stamp_s > 8.0
+        topic.stamp_s[rows] += 3600.0
+        topic.late_s[rows] -= 3600.0
+    text = said(drive, "Recording", "clock stepped").text
+    assert text.startswith("The driver's clock stepped forward by 1 h 00 min")
+
+
+def test_messages_that_waited_once_are_not_a_step_of_a_clock(drive: Drive) -> None:
+    """The recorder is busy for 2 s. All messages of this time arrive at its end."""
+    waiting = (drive.imu.stamp_s > 8.0) & (drive.imu.stamp_s < 10.0)
+    drive.imu.late_s[waiting] = 10.0 - drive.imu.stamp_s[waiting]
+    assert not [one for one in judge(drive.log()) if "clock" in one.text]
+    assert "latency_timer" in said(drive, "Timing", "The delay of imu/data_raw").advice
+
+
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
     """Some messages have NaN or infinity.
 

@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator
 
-from omnibot_driver.tools.report import events, following, rhythm, sensing, streams, travel
+from omnibot_driver.tools.report import clocks, events, following, rhythm, sensing, streams, travel
 from omnibot_driver.tools.report.findings import Finding, Level
 from omnibot_driver.tools.report.log import Log
 
@@ -48,12 +48,18 @@ def _all(log: Log) -> Iterator[Finding]:
             " gap or a stop.",
             "Record all topics: ros2 bag record --all.",
         )
+    stepped = clocks.step(log)
+    if stepped is not None:
+        yield from clocks.judge(stepped)
+        if stepped.recorders:
+            log = clocks.by_stamp(log)
     yield from events.judge(log)
     if len(log.imu):
         yield from rhythm.judge(log, log.imu, streams.IMU)
     if len(log.odom):
         yield from rhythm.judge(log, log.odom, streams.ODOMETRY)
-    yield from following.judge(log)
+    if stepped is None:
+        yield from following.judge(log)
     yield from travel.judge(log)
     yield from sensing.judge(log)
 

@@ -43,8 +43,8 @@ class Series:
         """For each row, whether it contains neither NaN nor infinity."""
         return np.asarray(np.isfinite(self.values).all(axis=1))
 
-    def only(self, rows: Mask) -> "Series":
-        """Return a series that contains only the selected rows."""
+    def only(self, rows: Mask | NDArray[np.intp]) -> "Series":
+        """Return a series that contains only the selected rows, given by a mask or by indices."""
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     @property

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from omnibot_driver.tools.report import clocks
 from omnibot_driver.tools.report.findings import Finding, Level, counted, span
 from omnibot_driver.tools.report.log import OTHER_CLOCK_S, Array, Log, Series, Span
 from omnibot_driver.tools.report.streams import Stream
@@ -104,7 +105,7 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
     Return None if the gap is short, or if the driver's state explains it.
     """
-    rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
+    rest = Span(float(stamped.arrived_s.max()), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
         return None
     return rest
@@ -146,7 +147,8 @@ def judge(log: Log, series: Series, stream: Stream) -> Iterator[Finding]:
         return
     yield from _steps(rhythm, stream)
     yield from _gaps(log, rhythm, stream)
-    yield from _arrival(rhythm, stream)
+    if clocks.step(log) is None:
+        yield from _arrival(rhythm, stream)
 
 
 def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
