@@ -34,6 +34,15 @@ CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
+BLOCK_S: Final = 0.5
+"""Shortest time in s in which the samples of a block arrive.
+
+After a stall, hundreds of samples arrive at once, and all of them are late. They must not be more
+than one block. Otherwise, there would be no block with a sample that was on time.
+"""
+EARLY_S: Final = 5e-4
+"""If a sample seems early by more than this time, in s, no earlier sample was lost: the two samples
+before it were only late."""
 
 
 class ImuSamples:
@@ -60,8 +69,11 @@ class ImuSamples:
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
         self._floor_s: deque[float] = deque(maxlen=PHASE_BLOCKS)
-        self._block_s, self._block_from = math.inf, 0
+        self._block_s, self._block_from, self._block_at_s = math.inf, 0, 0.0
         self._delay_s = 0.0
+        self._guessed = 0
+        """Number of samples that are counted as lost only because two successive samples seemed to
+        be late. No later sample has confirmed this yet."""
 
     def reading(self, pair: Pair) -> ImuReading:
         """Convert a pair of lines to a reading in SI units."""
@@ -88,7 +100,7 @@ class ImuSamples:
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
-            self._phase_s = self._arrived_s = arrived_s
+            self._phase_s = self._arrived_s = self._block_at_s = arrived_s
             return arrived_s
         since_s, self._arrived_s = arrived_s - self._arrived_s, arrived_s
         self._count += 1 + skipped
@@ -97,12 +109,19 @@ class ImuSamples:
         lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S
         waited = arrived_s > next_pose_s + PERIOD_S  # sample and pose were read late
+        if self._floor_s and self._guessed and delay_s < -EARLY_S:
+            lost -= self._guessed
+            delay_s += self._guessed * PERIOD_S
+            self._guessed = 0
+        elif delay_s < EARLY_S:
+            self._guessed = 0
         if delay_s < -PERIOD_S / 2:
             lost += (more := round(delay_s / PERIOD_S))
             delay_s -= more * PERIOD_S
         elif since_s > REGULAR * PERIOD_S and min(delay_s, self._delay_s) > LATE * PERIOD_S:
             more = 0 if waited else int(min(delay_s, self._delay_s) / PERIOD_S + 1.0 - LATE)
             lost += more
+            self._guessed += more
             delay_s -= more * PERIOD_S
         self._delay_s = 0.0 if waited else delay_s
         self._count += lost
@@ -123,7 +142,9 @@ class ImuSamples:
         self._block_s = min(self._block_s, delay_s + self._phase_s)
         if self._block_s < self._phase_s:
             self._phase_s = self._block_s
-        if self._count - self._block_from >= BLOCK:
+        lasted_s = self._arrived_s - self._block_at_s
+        if self._count - self._block_from >= BLOCK and lasted_s >= BLOCK_S:
             self._floor_s.append(self._block_s)
             self._phase_s = min(self._floor_s)
             self._block_s, self._block_from = math.inf, self._count
+            self._block_at_s = self._arrived_s

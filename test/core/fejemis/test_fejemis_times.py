@@ -171,6 +171,43 @@ def test_rare_reads_lose_no_odometry(seed: int) -> None:
     assert len(bench.imu) == pytest.approx(200, abs=6)
 
 
+def sampled(arrivals: list[float]) -> list[float]:
+    """Return the sampling times of IMU samples that arrive at these times, in s.
+
+    The board takes a sample every 10 ms, and a pose every 20 ms.
+    """
+    imu = ImuSamples("m/s^2")
+    return [
+        imu.sampled_s(arrived_s, number // 2 * 0.02, math.inf, 0)
+        for number, arrived_s in enumerate(arrivals)
+    ]
+
+
+def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken() -> None:
+    """The host does not read for 6 s, and all samples of this time arrive together.
+
+    The newest samples of a few seconds usually show the phase of the sampling times. But all
+    samples that waited are late, so the phase must stay.
+    """
+    arrivals = [
+        11.0 if 5.0 < 0.01 * number < 11.0 else 0.01 * number + 3e-4 for number in range(1500)
+    ]
+    errors = [at_s - 0.01 * number for number, at_s in enumerate(sampled(arrivals))]
+    assert max(map(abs, errors)) < 1e-3
+
+
+def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
+    """Two successive samples are 17 ms late, and the next one is 7 ms late. No sample is lost.
+
+    After the second sample, it seems as if one sample was lost. The third sample would then be
+    3 ms early, and that is impossible. So it shows that no sample was lost.
+    """
+    late_s = {200: 0.017, 201: 0.017, 202: 0.007}
+    arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]
+    errors = [at_s - 0.01 * number for number, at_s in enumerate(sampled(arrivals))]
+    assert max(map(abs, errors[:201] + errors[202:])) < 1e-3
+
+
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
     """The driver makes sure that each stamp is later than the previous stamp of the same kind.
 
