@@ -105,9 +105,13 @@ class MartOdometry(Reckoning):
         more_mps, more_radps = (
             each * ahead_s / 2 for each in (ACCELERATION_MPS2, ACCELERATION_RADPS2)
         )
+        # While the robot speeds up, the mean speeds are too low.
+        lag_mps, lag_radps = self.speeds.changes
         if self.motion is Motion.NONE:
-            more_mps = more_radps = 0.0
+            more_mps = more_radps = lag_mps = lag_radps = 0.0
+        elif not self.speeds.are_known:
+            lag_mps, lag_radps = STARTS_MPS, STARTS_RADPS
         return (
-            SPEED_STDDEV_MPS**2 + (speed_mps * part) ** 2 + more_mps**2,
-            SPEED_STDDEV_RADPS**2 + (rate_radps * part) ** 2 + more_radps**2,
+            SPEED_STDDEV_MPS**2 + (speed_mps * part) ** 2 + more_mps**2 + lag_mps**2,
+            SPEED_STDDEV_RADPS**2 + (rate_radps * part) ** 2 + more_radps**2 + lag_radps**2,
         )

@@ -4,6 +4,7 @@
 
 import math
 from dataclasses import astuple
+from statistics import mean
 
 import pytest
 from honesty import RARE, nees
@@ -19,6 +20,7 @@ from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
 from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packet
+from omnibot_driver.simulator.mart import Firmware
 
 WRONG_NEES = 28.0
 """A normalised squared error above this value is a failure of the test.
@@ -52,6 +54,38 @@ def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench
         counts.append(round(bench.server.chassis.counts))
     assert counts[0] == counts[1] != 0
     return bench
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", ["documented", "source"])
+@pytest.mark.parametrize("twist", [(0.3, 0.0), (0.3, 0.4), (0.0, 0.5), (-0.2, 0.0)])
+def test_the_covariance_of_the_twist_covers_its_error(
+    firmware: Firmware, twist: tuple[float, float]
+) -> None:
+    """While the robot speeds up, the mean speed of the last counts is too low.
+
+    The variances of the twist include this error: over three drives and stops, the normalised
+    squared errors of the speed and of the turn rate are at most 1 on average.
+    """
+    bench = MartBench(firmware, seed=1).ready()
+    chassis = bench.server.chassis
+    errors: list[tuple[float, float]] = []
+    for step in range(3 * 100):
+        if step % 100 < 60:
+            bench.try_command(*twist)
+        bench.run(0.05)
+        told = bench.odometry[-1]
+        assert told.twist is not None
+        assert told.twist_variances is not None
+        rate_radps = (chassis.right_mps - chassis.left_mps) / MartSettings().track_m
+        linear, angular = told.twist_variances
+        errors.append(
+            (
+                (told.twist.vx_mps - chassis.speed_mps) ** 2 / linear,
+                (told.twist.yaw_rate_radps - rate_radps) ** 2 / angular,
+            )
+        )
+    assert all(mean(each) < 1.0 for each in zip(*errors, strict=True))
 
 
 @pytest.mark.slow
