@@ -179,8 +179,9 @@ class Publishing:
                 self._handlers[kind](event, offset_ns)
             elif 0 < now_ns < LATEST_NS:
                 steady_ns = round(event.stamp_s * 1e9)
-                stamp_ns = max(steady_ns + offset_ns, self._stamped_ns.get(kind, 0) + 1)
-                self._stamped_ns[kind] = stamp_ns
+                content = kind if extra is None else type(extra)
+                stamp_ns = max(steady_ns + offset_ns, self._stamped_ns.get(content, 0) + 1)
+                self._stamped_ns[content] = stamp_ns
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:

@@ -303,3 +303,22 @@ def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> No
     publishing.extras = {Charge: lambda charge, ns: published.append((charge.volts, ns))}
     publishing.publish([Extra(Charge(12.5), 2.0), Extra(Charge(12.4), 2.5)], 10**9)
     assert published == [(12.5, 3 * 10**9), (12.4, 3_500_000_000)]
+
+
+def test_in_simulated_time_each_kind_of_extra_reading_has_its_own_time(node: Node) -> None:
+    """A reading is older than a reading of another kind that was published before it.
+
+    Its stamp is older too: stamps have to increase only within a kind.
+    """
+    node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
+    _, publishing = session_with(node)
+    stamps_ns: list[int] = []
+    publishing.extras = dict.fromkeys((Charge, str), lambda _, ns: stamps_ns.append(ns))
+    node.get_clock().set_ros_time_override(Time(seconds=5.0))  # type: ignore[attr-defined]
+    now = time.monotonic()
+    publishing.deliver(
+        [Extra(Charge(12.5), now), Extra("", now - 0.5), Extra(Charge(12.4), now - 0.1)]
+    )
+    assert stamps_ns[1] == pytest.approx(stamps_ns[0] - 500_000_000, abs=10)
+    assert stamps_ns[2] == stamps_ns[0] + 1
+    publishing._time_watch.unregister()  # otherwise rcl calls the destroyed watch
