@@ -25,6 +25,11 @@ a series lasts ``HEALS_AFTER_S`` (s), the sender's clock was probably set back."
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
 corrects a clock."""
+LARGEST_CORRECTION_S: Final = 0.4
+LASTING_DRIFT: Final = 1e-4
+"""Largest assumed drift between two clocks over a long time, in s per s: the tolerance of their
+crystals. The correction by NTP is assumed to add at most ``LARGEST_CORRECTION_S``, in s. It steps
+the clock if the error is larger."""
 CLOCK_RETREATS: Final = 10.0
 """Factor for the misfit (``_Sender.misfit_s``) of a message that is too early for a sender. A
 message that is 1 s too early fits as badly as a message that is 10 s too late. A message is
@@ -213,7 +218,8 @@ class _Offset:
         return weight * max(0.0, abs(excess_s) - drift_s), weight * (abs(excess_s) + drift_s)
 
     def _drift_s(self, at_s: float) -> float:
-        return LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
+        passed_s = max(0.0, at_s - self._least_at_s)
+        return min(LARGEST_DRIFT * passed_s, LARGEST_CORRECTION_S + LASTING_DRIFT * passed_s)
 
     def hear(self, difference_s: float, at_s: float, longest_s: float) -> float:
         late_s = self.late_s(difference_s, at_s)

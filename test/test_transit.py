@@ -267,6 +267,17 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
         assert not refused(receiver.hear(sender, now_s, 0.01 + 0.1 * (number % 3)))
 
 
+def test_an_old_command_is_refused_after_a_night_without_commands() -> None:
+    """The driver gets no command for eight hours. Then a command arrives that was sent 5 s ago.
+
+    In this time, the clocks may have drifted apart, but not by as much as 5 s.
+    """
+    receiver, sender = Receiver(), Sender()
+    for number in range(20):
+        receiver.hear(sender, 100.0 + 0.1 * number, 0.01)
+    assert refused(receiver.hear(sender, 100.0 + 8 * HOUR_S, 5.0))
+
+
 def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
     """A refusal says how old the command is, and whether to check the network or this computer."""
     with pytest.raises(CommandRefused, match=r"^cmd_vel refused: it was sent 1\.2 s ago.*network"):
