@@ -3,6 +3,7 @@
 """Topics and services that only the LOIS ECU has. This module only connects ROS to the session."""
 
 from collections.abc import Callable, Mapping
+from enum import Enum
 from typing import Any, Final, cast
 
 import rclpy
@@ -39,6 +40,12 @@ LEFT: Final = (
     " that mode were not reported"
 )
 NOT_HEARD: Final = "no data from the board; connect it and switch it on, then call again"
+
+
+class OwnTopic(Enum):
+    """The topic that can command only this board."""
+
+    DUTY = "duty_cmd"
 
 
 class LoisEcuTopics:
@@ -191,4 +198,4 @@ class LoisEcuTopics:
                 " controller"
             )
         rate_radps = 1.0 / (settings.duty_scale * settings.wheel_radius_m)
-        session.command_wheels([duty * rate_radps for duty in duties], now)
+        session.command_wheels([duty * rate_radps for duty in duties], now, by=OwnTopic.DUTY)

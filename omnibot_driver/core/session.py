@@ -10,10 +10,12 @@ This module connects the parts of a session. It does not know bytes or threads.
 
 import math
 from collections.abc import Sequence
+from enum import Enum
 
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.interlocks import Interlocks
 from omnibot_driver.core.commands.pipeline import Command, CommandPipeline
+from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.events import Event
@@ -203,12 +205,16 @@ class Session:
         if sideways or not planar:
             self._reporter.set_to_zero(sideways=sideways, planar=planar)
 
-    def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
+    def command_wheels(
+        self, rates_radps: Sequence[float], now: float, *, by: Enum = Authority.WHEELS
+    ) -> None:
         """Command wheel rates, in rad/s.
 
         If this method raises CommandRefused, the earlier command stays in effect.
+
+        ``by``: the topic that commands, if it is one that only this board has.
         """
-        self._command(self._commanding.wheels(rates_radps, now), now)
+        self._command(self._commanding.wheels(rates_radps, now, by=by), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
         """Command a pose in the odometry frame.

@@ -8,6 +8,7 @@ whether a robot may be driven now.
 
 import math
 from collections.abc import Sequence
+from enum import Enum
 from typing import Final
 
 from omnibot_driver.core.board import Board
@@ -162,9 +163,9 @@ class CommandPipeline:
         motion = self.shaper.base(twist, before=self.policy.current, since=now - PACE_S)
         return motion, expires_at
 
-    def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
+    def wheels(self, rates_radps: Sequence[float], now: float, *, by: Enum) -> Command:
         """Return the command for wheel rates in rad/s, in the sequence of ``Traits.wheels``."""
-        return self.shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
+        return self.shaper.wheels(rates_radps, by=by), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
         """Return the command to drive to a pose in the odometry frame, which never expires."""

@@ -28,7 +28,10 @@ always below these limits."""
 
 
 class Authority(Enum):
-    """The topics that can command the robot, by name. The newest command is in effect."""
+    """The common topics that can command the robot, by name. The newest command is in effect.
+
+    A topic that only one board has is a member of an ``Enum`` of that board.
+    """
 
     BASE = "cmd_vel"
     WHEELS = "wheel_cmd"
@@ -39,7 +42,7 @@ class Setpoint(Protocol):
     """A command that is in effect until it expires or is replaced."""
 
     @property
-    def authority(self) -> Authority:
+    def authority(self) -> Enum:
         """Topic that gave the command."""
 
     @property
@@ -124,9 +127,7 @@ class SteadySetpoint:
 
     settled: Final = True
 
-    def __init__(
-        self, authority: Authority, order: Order, is_zero: Callable[[Order], bool]
-    ) -> None:
+    def __init__(self, authority: Enum, order: Order, is_zero: Callable[[Order], bool]) -> None:
         self.authority = authority
         self._order, self._is_zero = order, is_zero
         self.final = order

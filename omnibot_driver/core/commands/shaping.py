@@ -7,6 +7,7 @@ not know when anything is sent.
 """
 
 from collections.abc import Sequence
+from enum import Enum
 from typing import Literal
 
 from omnibot_driver.core.board import Board, Mode
@@ -83,8 +84,11 @@ class CommandShaper:
             since=since,
         )
 
-    def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
-        """Return the set-point for wheel rates in rad/s. The order is that of ``Traits.wheels``."""
+    def wheels(self, rates_radps: Sequence[float], *, by: Enum) -> Setpoint:
+        """Return the set-point for wheel rates in rad/s. The order is that of ``Traits.wheels``.
+
+        ``by``: the topic that commands.
+        """
         if not self.takes_velocities:
             raise self._at_odds(Authority.WHEELS)
         wheels = self._board.traits.wheels
@@ -96,7 +100,7 @@ class CommandShaper:
         require_finite("wheel_cmd", rates_radps)
         limited = self.limits.wheels(rates_radps)
         self.limited += limited != tuple(rates_radps)
-        return SteadySetpoint(Authority.WHEELS, TurnWheels(limited), self._actuator.is_zero)
+        return SteadySetpoint(by, TurnWheels(limited), self._actuator.is_zero)
 
     def pose(self, goal: Pose) -> Setpoint:
         """Return the set-point to drive to a pose in the odometry frame and stay there."""

@@ -5,6 +5,8 @@
 Before such a change, the driver stops the robot and refuses motion.
 """
 
+from enum import Enum
+
 import pytest
 from lois_bench import FIRMWARE, Bench, configure, refusal
 
@@ -83,3 +85,20 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
     with pytest.raises(CommandRefused, match="duty_scale is changing to 500"):
         bench.drive()
     bench.run_until(lambda: bench.robot.stands)
+
+
+def test_the_robot_is_stopped_between_a_topic_of_this_board_and_wheel_cmd() -> None:
+    """A topic that only this board has commands wheel rates; then ``wheel_cmd`` does.
+
+    Stop is sent in between, as for every change of the topic.
+    """
+    bench = Bench("documented", LoisEcuSettings(drive_mode="duty"))
+    own = Enum("own", {"DUTY": "duty_cmd"}).DUTY  # type: ignore[attr-defined]
+    bench.session.command_wheels((1.0, 1.0), bench.now, by=own)
+    bench.run(0.2)
+    assert bench.session.figures(bench.now).commands.source == "duty_cmd"
+    before = len(bench.written)
+    bench.session.command_wheels((1.0, 1.0), bench.now)
+    bench.run(0.2)
+    duties = [data for _, data in bench.written[before:] if data.startswith(b":01")]
+    assert duties[0] == b":01000000003b\n" != duties[-1]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from lois_ecu_rig import Ecu, ecu_of, set_parameter
 from probe import Probe, leave_events_out
 from rcl_interfaces.msg import Log
@@ -109,6 +110,31 @@ def test_duties_are_commanded_in_duty_mode_and_one_that_waited_is_refused(
     ecu.wait_for(lambda board: not board.standing)
     probe.remove(timer)
     ecu.stands_for_good()
+
+
+def test_duty_cmd_is_a_topic_of_its_own(
+    start_driver: Start, probe_of: Start, stack: ExitStack
+) -> None:
+    """Duties are commanded, then wheel rates. The diagnostics name the topic that commands.
+
+    Bug: they named ``wheel_cmd`` for both.
+    """
+    ecu = ecu_of("firmware", stack)
+    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", drive_mode="duty"))
+    probe.wait_for_state("nominal")
+    diagnoses = probe.listen(DiagnosticArray, "/diagnostics")
+
+    def source() -> str:
+        pairs = (pair for one in diagnoses[-1:] for part in one.status for pair in part.values)
+        return next((str(pair.value) for pair in pairs if pair.key == "Source"), "")
+
+    for topic, value in (("duty_cmd", 30.0), ("wheel_cmd", 2.0)):
+        publisher = probe.publisher(Float32MultiArray, topic)
+        message = Float32MultiArray(data=[value, value])
+        timer = probe.node.create_timer(0.1, lambda p=publisher, m=message: p.publish(m))
+        probe.wait_for(lambda topic=topic: source() == topic)
+        probe.remove(timer)
+        probe.forget_message()
 
 
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
