@@ -45,6 +45,13 @@ PARAMETERS: Final = table(
         "twist_linear_stddev",
         "twist_angular_stddev",
     ),
+    changed={
+        "max_wheel_speed": {
+            "description": "Largest wheel rate that the driver commands for wheel_cmd, and in"
+            " drive_mode duty also for duty_cmd (by duty_scale). If one wheel exceeds it, both"
+            " wheels are slowed down in the same ratio."
+        }
+    },
     checks=(
         require_possible_periods,
         require_checksum_in_terminal_mode,

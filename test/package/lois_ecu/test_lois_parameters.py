@@ -18,3 +18,10 @@ def test_commands_are_slow_in_a_terminal_mode() -> None:
         PARAMETERS.check_all({"terminal_mode": "compass", "command_rate": 30.0})
     PARAMETERS.check_all({"command_rate": 30.0})
     PARAMETERS.check_all({"terminal_mode": "compass"})
+
+
+def test_the_description_of_max_wheel_speed_names_every_topic_that_it_limits() -> None:
+    """The largest wheel rate limits ``wheel_cmd`` and ``duty_cmd``. Its description names both."""
+    description = PARAMETERS.by_name["max_wheel_speed"].description
+    assert "wheel_cmd" in description
+    assert "duty_cmd" in description
