@@ -252,23 +252,24 @@ class SettingsWriter:
         pauses between the lines do not prevent this, because a busy computer may write all lines of
         a round together.
         """
-        found = list(self.commands())
-        first = 0 if self.settings.with_sum else 2  # the first two must keep their order
-        rest = found[first:]
+        rest = list(self.commands())
         place = rounds * len(rest) // ROUNDS % len(rest)
         # The board sends no dates after a boot. So each round requests one date.
         periodic = self._answered and self._dates_come_periodically
         asked = [] if periodic else [SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)]
-        return [*found[:first], *rest[place:], *rest[:place], *asked]
+        if self.settings.with_sum:
+            return [*rest[place:], *rest[:place], *asked]
+        # The mode overwrites the left short correction, which could be lost with a single line.
+        mode = SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
+        again = self._left_short_correction()
+        return [mode, again, *rest[place:], again, *rest[:place], again, *asked]
 
     def commands(self) -> Iterable[Command]:
-        """Yield the commands that write settings.
+        """Yield the commands that write settings, except the terminal mode.
 
         ``_turned`` changes their order from round to round.
         """
         settings = self.settings
-        if not settings.with_sum:
-            yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
         if self.overwritten or not settings.with_sum:
             yield self._left_short_correction()
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)

@@ -49,3 +49,23 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
     rig.driver.write_settings(rig.now)
     rig.order(20, 20, 3.0)
     assert rig.board.wheels[0].short_correction == pytest.approx(BOOT_SHORT_CORRECTION)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
+    """Some lines lose characters. The board has the left short correction after each writing.
+
+    The mode line of a round overwrites the correction with almost 0. With one line to restore it,
+    the correction was often lost in the last round.
+    """
+    rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
+    rig.run(6.0)
+    corrections = []
+    for _ in range(5):
+        rig.driver.write_settings(rig.now)
+        rig.run(4.0)
+        while not (rig.driver._upkeep.writer.done and rig.driver.confirmed):
+            rig.run(0.1)
+        corrections.append(rig.board.wheels[0].short_correction)
+    assert corrections == pytest.approx([BOOT_SHORT_CORRECTION] * 5)
