@@ -157,13 +157,14 @@ class Sequence:
         missing = max(0, passed - counted)
         elapsed_s = now - self._delta_at
         in_time = (self._told + missing) * self._period_s <= elapsed_s + self._period_s
-        from_zero = abs(count * self._per_pose - self._delta) <= self._per_pose
-        # While the counter of the last delta is doubtful, a pose does not show a restart.
-        goes_on = passed == self._per_pose or self._ahead is not None
+        delta = self._delta if self._ahead is None else self._ahead
+        from_zero = abs(count * self._per_pose - delta) <= self._per_pose
+        goes_on = passed == self._per_pose
         goes_on = goes_on or (in_time and missing * self._period_s > LONG_GAP_S)
         wrap = WRAP * self._per_pose
         off = (passed - counted) % wrap
         if from_zero and not goes_on and min(off, wrap - off) > 2 * self._per_pose:
+            self._delta, self._ahead = delta, None
             return Step(0, None, restarted=True)
         if not in_time:
             return Step(0)  # too little time has passed for these losses

@@ -204,6 +204,22 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
     assert sequence.pose(0, after_s + 0.16).restarted
 
 
+def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
+    """The board restarts, 3 s before its counter would have wrapped to 0.
+
+    By the time, the first count after the restart is a little too high for a wrap, so it is
+    doubtful. But the pose directly after it also begins at 0. No delta is counted as lost then.
+    """
+    sequence = Sequence()
+    for count in range(171):
+        sequence.delta(count, count * 0.04, imus=4)
+        if count % 5 == 0:
+            sequence.pose(count // 5, count * 0.04)
+    sequence.delta(0, 9.84, imus=4)
+    assert sequence.pose(0, 9.84).restarted
+    assert sequence.delta(1, 9.88, imus=4) == Step(0)
+
+
 def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
     """The port is closed and opened again, and the board has restarted in the meantime.
 
