@@ -291,7 +291,7 @@ class Session:
         if reason := self.interlocks.why_not_reset_odometry(now):
             raise RequestRefused(f"odometry not reset: {reason}")
         self._board.reset_odometry()
-        self._reporter.events += self._odometry.reset()
+        self._reporter.events += self._odometry.reset(now)
         self._reporter.notify(self._commanding.check_goal([], now))
 
     @property

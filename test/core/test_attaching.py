@@ -318,3 +318,60 @@ def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
     for _ in range(30):
         assumed.displace(earth(0.01, 0.0), 0.0)
     assert not assumed.heading_known
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("use_board_pose", [True, False])
+@pytest.mark.parametrize("lost", [5, 20, 40])
+def test_a_reset_after_a_gap_leaves_no_wrong_heading(
+    lost: int, use_board_pose: bool, frame: str
+) -> None:
+    """Displacements are lost while the robot ends a turn. Then the odometry is reset.
+
+    The gap hides where the robot points in the board's frame. The next poses show it, so the motion
+    after the reset has the right direction.
+    """
+    odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
+    attach(odometry, trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.02, 0.0, 0.04, frame), 0.0)
+    for number in range(lost):
+        trip.move(0.02, 0.0, 0.04 if number < 2 else 0.0)
+    odometry.displace(replace(trip.move(0.02, 0.0, 0.0, frame), lost=lost), 0.0)
+    odometry.reset()
+    trip.truth = (0.0, 0.0, 0.0)
+    estimates = []
+    for number in range(50):
+        estimates += odometry.displace(trip.move(0.02, 0.0, 0.01, frame), number * PERIOD_S)
+        if number % 5 == 4:
+            estimates += odometry.settle(trip.pose)
+    assert len(estimates) == 50
+    assert last(estimates) == close(trip.truth, 1e-6)
+
+
+@pytest.mark.parametrize("duration_s", [PERIOD_S, None])
+def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
+    duration_s: float | None,
+) -> None:
+    """The odometry is reset in a gap of 3 s, near its end or near its beginning.
+
+    Near the end, the lost motion is older than the reset, so odom does not contain it. Near the
+    beginning, odom contains it.
+    """
+    for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
+        odometry, trip = Odometry(SETTINGS), Trip()
+        attach(odometry, trip.pose)
+        odometry.displace(trip.move(0.0, 0.0, 0.0), 1.0)
+        odometry.reset(now)
+        for _ in range(74):
+            trip.move(0.01, 0.0, 0.0)
+        reading = trip.move(0.01, 0.0, 0.0)
+        if duration_s is None:
+            reading = replace(reading, dx_m=0.75, duration_s=None)
+        else:
+            reading = replace(reading, lost=74)
+        odometry.displace(reading, 4.0)
+        for _ in range(2):
+            odometry.settle(trip.pose)
+        estimates = odometry.displace(trip.move(0.0, 0.0, 0.0), 10.0)
+        assert last(estimates) == close((way_m, 0.0, 0.0), 1e-6)

@@ -107,8 +107,8 @@ class Odometry:
         self._bridge = GapInterpolation()
         self._last_stamp_s: float | None = None
         self.reset()
-        self._is_reset = False
-        """Whether the odometry was reset, and no displacement has arrived since then."""
+        self._reset_s: float | None = None
+        """Time in s of the last reset; None if a displacement has arrived since then."""
 
     @property
     def refused_poses(self) -> int:
@@ -132,33 +132,39 @@ class Odometry:
             fastest=(settings.fastest_mps, settings.fastest_radps),
         )
 
-    def reset(self) -> list[OdometryEstimate]:
+    def reset(self, now: float = math.inf) -> list[OdometryEstimate]:
         """Move the origin of the odometry frame to the robot's current pose.
 
         Return the estimates of displacements that were still waiting for a pose. Displacements that
-        waited for the board's first pose are discarded. If the duration of the next displacement is
-        unknown, its motion is discarded too, because most of it is older than the reset.
+        waited for the board's first pose are discarded. If the next displacement ends a gap, and
+        most of this gap is older than the reset, its motion is discarded too.
+
+        If motion was lost before the reset, the board's heading is uncertain. So the board's next
+        poses show it again, as they showed the initial heading.
+
+        ``now``: time of the reset in s, by the clock of the stamps. By default, the reset is at the
+        end of the present gap.
         """
         self.alignments += 1
         due = []
         if self._board is not None:
             due = self._release()
-            if self._track.uncertainty.gap != NOTHING:
-                self._belief.proved = None  # the next pose would also correct the old motion
+            if self._track.uncertainty.gap != NOTHING and self._belief.proved is not None:
+                self._board = self._belief.proved = None
         self._backlog = PendingDisplacements()
         self._track.begin()
-        self._is_reset = True
+        self._reset_s = now
         return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
         """Add a displacement; return its estimates, or none while it waits for a pose."""
         estimates = []
-        if self._is_reset:
-            self._is_reset = False
-            if reading.duration_s is None:  # most of its motion is older than the reset
-                self.displace(reading, stamp_s)
-                self.reset()
-                return []
+        reset_s, self._reset_s = self._reset_s, None
+        gap_s = self._gap_s(reading, stamp_s)
+        if reset_s is not None and gap_s and stamp_s - reset_s < gap_s / 2:
+            self.displace(reading, stamp_s)
+            self.reset(stamp_s)
+            return []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
             self._backlog = PendingDisplacements()
@@ -352,6 +358,12 @@ class Odometry:
             self._track.uncertainty.give_up()
         self._board = told
         self._belief.believe(told)
+
+    def _gap_s(self, reading: DisplacementReading, stamp_s: float) -> float:
+        """Return the duration in s of a gap that ends with this displacement; 0 without a gap."""
+        if reading.duration_s is None:
+            return math.inf if self._last_stamp_s is None else stamp_s - self._last_stamp_s
+        return (reading.lost + 1) * reading.duration_s if reading.lost else 0.0
 
     def _reachable(self, told: Pose, lost_s: float = 0.0) -> bool:
         waited_s = self._backlog.unheard_s(self._last_stamp_s) + self._backlog.duration_s + lost_s
