@@ -66,6 +66,7 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
         if number % 5 == 4:
             estimates += odometry.settle(trip.pose)
     assert last(estimates) == close(trip.truth, 1e-6)
+    assert odometry.refused_poses == 0
 
 
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:

@@ -171,9 +171,9 @@ class Odometry:
             self._restarted, self._belief.doubted = Pose(), None
         if self._restarted is not None:
             self._restarted = advanced(self._restarted, reading)
-        self._belief.displaced(reading)
         is_nowhere = self._board is None or self._restarted is not None
         means_nothing = is_nowhere and reading.frame == "earth"
+        self._belief.displaced(reading, bridges=means_nothing)
         lost_s = reading.lost * (reading.duration_s or 0.0)
         if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
             return [*estimates, self._integrate(reading, stamp_s)]
@@ -309,7 +309,7 @@ class Odometry:
     def _assume(self) -> None:
         """Assume that the last, unconfirmed pose is right. Without any pose, assume heading 0."""
         if self._belief.doubted is not None:
-            self._begin_at(self._backlog.before(self._belief.doubted))
+            self._begin_at(self._before_waiting(self._belief.doubted))
         else:
             self.heading_assumed = True
             self._begin_at(Pose())

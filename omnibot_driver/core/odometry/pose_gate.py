@@ -11,6 +11,7 @@ from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.gap_interpolation import LONGEST_BRIDGE_S
 from omnibot_driver.core.odometry.pending_displacements import advanced
 from omnibot_driver.core.readings import DisplacementReading
 
@@ -45,10 +46,18 @@ class PoseGate:
         self.doubted: Pose | None = None
         self._unproved_s = 0.0
 
-    def displaced(self, reading: DisplacementReading) -> None:
-        """Add a reported motion of the robot to the unconfirmed pose ``doubted``."""
-        if self.doubted is not None:
-            self.doubted = advanced(self.doubted, reading)
+    def displaced(self, reading: DisplacementReading, *, bridges: bool) -> None:
+        """Add a reported motion of the robot to the unconfirmed pose ``doubted``.
+
+        ``bridges``: whether the lost displacements before it are added too, as if they were equal
+        to it. If not, the caller adds them by ``bridged``.
+        """
+        if self.doubted is None:
+            return
+        if bridges and reading.duration_s:
+            for _ in range(min(reading.lost, round(LONGEST_BRIDGE_S / reading.duration_s))):
+                self.doubted = advanced(self.doubted, reading)
+        self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
         """Add the robot's motion during a gap to the unconfirmed pose ``doubted``.
