@@ -62,18 +62,19 @@ class Keeper:
         """Killed processes that have not ended yet."""
         self._broken = False
         self._restart_at = -math.inf
-        self._told = False
+        self._told: set[str] = set()
         self._start()
 
     def beat(self, now: float, *, latched: bool = False) -> str:
         """Send the guard a heartbeat. Call this method every 0.1 s, neither more nor less often.
 
-        Returns a sentence for the user at the guard's first failure, otherwise an empty text.
+        Returns a sentence for the user when a guard fails for the first time, and when a guard
+        cannot be started for the first time. Otherwise returns an empty text.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
         if self._process is not None and (trouble := self._beat(self._process, word)):
-            self._tell(f"{trouble}; starting another guard process")
+            self._tell("failed", f"{trouble}; starting another guard process")
         if self._process is None and now >= self._restart_at and len(self._dying) < MOST_DYING:
             self._restart_at = now + RESTART_S
             self._start()
@@ -173,7 +174,7 @@ class Keeper:
                 start_new_session=True,  # ctrl-C is for the driver alone
             )
         except OSError as error:
-            self._tell(f"cannot start the guard process ({error}): {WITHOUT_GUARD}")
+            self._tell("missing", f"cannot start the guard process ({error}): {WITHOUT_GUARD}")
             return
         assert self._process.stdin is not None
         os.set_blocking(self._process.stdin.fileno(), False)
@@ -193,9 +194,15 @@ class Keeper:
             return process.wait(DIES_WITHIN_S)
         return None
 
-    def _tell(self, trouble: str) -> None:
-        if not self._told:
-            self._told, self._trouble = True, trouble
+    def _tell(self, kind: str, trouble: str) -> None:
+        """Report the first trouble of each kind.
+
+        The kinds are separate: after a report that announces another guard, the driver must still
+        report that this guard cannot be started.
+        """
+        if kind not in self._told:
+            self._told.add(kind)
+            self._trouble = "; ".join(filter(None, (self._trouble, trouble)))
 
 
 WITHOUT_GUARD: Final = "if the driver is killed, the robot continues with its last command"

@@ -91,6 +91,26 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     line.hear(LAST_WORDS)
 
 
+def test_a_dead_guard_that_cannot_be_replaced_is_told_as_well(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A guard dies, and no other can be started. The driver reports that there is no guard.
+
+    The earlier report announces another guard, so alone it would be false.
+    """
+    keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
+    (first,) = line.children()
+    with monkeypatch.context() as without:
+        without.setattr("sys.executable", "/no/python")
+        os.kill(first, signal.SIGKILL)
+        os.waitid(os.P_PID, first, os.WEXITED | os.WNOWAIT)
+        told = [keeper.beat(EARLY_S + n * BEAT_S) for n in range(30)]
+    assert "exit code -9" in "".join(told)
+    assert "".join(told).count("cannot start the guard process") == 1
+    assert line.children() == []
+    keeper.end(stopped=True)
+
+
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     """A guard process hangs and does not read its heartbeats.
 
