@@ -53,8 +53,18 @@ def explain(url: str, parameter: str, error: Exception) -> str:
     code = error.errno if isinstance(error, OSError) else None
     if isinstance(error, ValueError) and "baud rate" in str(error):
         return f"{url} cannot be set to this speed: {error}; check the parameter `baudrate`"
+    if "remote rejected" in str(error):  # the words of pyserial for rfc2217://
+        return (
+            f"cannot open {url}: the server does not accept a setting ({error}); check the"
+            " parameter `baudrate` and the server"
+        )
     if _is_misread(error):
         return _misread(url, parameter)
+    if _is_gone(error):
+        return (
+            f"cannot open {url}: the device does not respond; unplug the board and plug it in"
+            f" again, or check the parameter `{parameter}`"
+        )
     no_terminal = isinstance(error, termios.error) or isinstance(error.__context__, termios.error)
     if no_terminal or code == errno.EISDIR:
         return _no_terminal(url, parameter)
@@ -82,6 +92,14 @@ def explain(url: str, parameter: str, error: Exception) -> str:
             " its port"
         )
     return f"cannot open {url}: {reason}; check the parameter `{parameter}`"
+
+
+def _is_gone(error: Exception) -> bool:
+    """Return whether the port is a terminal whose device was unplugged, or does not exist."""
+    return any(
+        isinstance(each, termios.error) and each.args[:1] in ((errno.EIO,), (errno.ENODEV,))
+        for each in (error, error.__context__)
+    )
 
 
 def _is_misread(error: Exception) -> bool:

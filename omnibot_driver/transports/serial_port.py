@@ -59,7 +59,7 @@ class SerialPort:
                 baudrate=baudrate,
                 timeout=READ_TIMEOUT_S,
                 # Over rfc2217 pyserial cannot limit a write's time; the socket limits it to 5 s.
-                write_timeout=None if url.startswith("rfc2217:") else WRITE_TIMEOUT_S,
+                write_timeout=None if url.lower().startswith("rfc2217:") else WRITE_TIMEOUT_S,
                 exclusive=True,
             )
         except LinkError:
