@@ -204,7 +204,8 @@ def _run(ending: Ending, args: list[str]) -> None:
 def _set_deadline() -> None:
     """End the process by force if the shutdown takes longer than 5 s (``LONGEST_END_S``).
 
-    The guard process then stops the robot.
+    The guard process then stops the robot. If no thread can be started, there is no deadline: the
+    shutdown must stop the robot even then.
     """
 
     def give_up() -> None:
@@ -217,7 +218,8 @@ def _set_deadline() -> None:
 
     deadline = threading.Timer(LONGEST_END_S, give_up)
     deadline.daemon = True
-    deadline.start()
+    with contextlib.suppress(RuntimeError):
+        deadline.start()
 
 
 if __name__ == "__main__":
