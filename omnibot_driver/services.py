@@ -120,7 +120,10 @@ class Services:
             if self._node.executor is not None:
                 self._node.executor.wake()
 
-        threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        try:
+            threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        except RuntimeError as error:  # the limit of processes: the caller must get an answer
+            answer.set_result(str(error))
         trouble = await answer
         if trouble:
             response.success = False

@@ -86,8 +86,12 @@ class Recorder:
 
     def _on_record(self, reading: RecordReading, _stamp_ns: int) -> None:
         """Write the record on a separate thread, so that a slow disk does not delay the reader."""
-        save = partial(self._save, self._token, reading)
-        threading.Thread(target=save, name="omnibot-record", daemon=True).start()
+        token = self._token
+        save = partial(self._save, token, reading)
+        try:
+            threading.Thread(target=save, name="omnibot-record", daemon=True).start()
+        except RuntimeError as error:  # the limit of processes: the caller must get an answer
+            self._end_unsaved(token, reading, error)
 
     def _save(self, token: Future | None, reading: RecordReading) -> None:
         kind = reading.record.kind
@@ -96,14 +100,16 @@ class Recorder:
             path = folder / lois_ecu_records.file_name(kind, time.time())
             saved = lois_ecu_records.save(reading, path, partial(self._is_current, token))
         except Exception as error:  # the caller must get an answer
-            self._end(
-                token, False, f"the {NAMES[kind]} was received, but could not be saved: {error}"
-            )
+            self._end_unsaved(token, reading, error)
             return
         if saved:
             if remark := lois_ecu_records.remark(reading):
                 self._node.get_logger().warning(remark)
             self._end(token, True, str(path.absolute()))
+
+    def _end_unsaved(self, token: Future | None, reading: RecordReading, error: Exception) -> None:
+        name = NAMES[reading.record.kind]
+        self._end(token, False, f"the {name} was received, but could not be saved: {error}")
 
     def _is_current(self, token: Future | None) -> bool:
         return bool(self._link.call(lambda session, _now: session.task_is_current(token)))

@@ -187,7 +187,10 @@ class MartTopics:
             if self._node.executor is not None:
                 self._node.executor.wake()
 
-        threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        try:
+            threading.Thread(target=save, name="omnibot-save", daemon=True).start()
+        except RuntimeError as error:  # the limit of processes: the caller must get an answer
+            answer.set_result((False, str(error)))
         saved, text = await answer
         if not saved:
             return False, f"{done.message}; not saved: {text}"
