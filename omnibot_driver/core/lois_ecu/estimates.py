@@ -104,6 +104,12 @@ class Estimates:
         rolled_m = left_mps * unheard_s, right_mps * unheard_s
         covariance = self._covariance(pose.yaw_rad, twist, rolled_m)
         variances, displacement = motion.twist_variances(), self.pose.way_to(pose)
+        if unheard_s > 0.0:  # each wheel may now stand, or roll as fast as it can
+            turning_radps = math.hypot(left_mps, right_mps) / self._settings.track_m
+            variances = (
+                variances[0] + ((left_mps + right_mps) / 2) ** 2,
+                variances[1] + turning_radps**2,
+            )
         return FusedOdometry(
             stamp_s, pose, twist, covariance, variances, displacement, ways_m, self._source
         )

@@ -52,6 +52,26 @@ class Told:
         return math.degrees(math.sqrt(estimate.covariance.yaw_yaw))
 
 
+def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
+    """The board falls silent while it drives. After 1 s the robot may drive on or stand.
+
+    The driver predicts the motion for 0.6 s only. Afterwards the variances of the twist include a
+    standstill: a board that restarts has stopped.
+    """
+    odometry, now = LoisOdometry(LoisEcuSettings()), 0.0
+    for report in range(20):
+        now += 0.2
+        odometry.heard_ticks(Ticks(round(1e3 * now), 4 * report, 4 * report), now)
+        odometry.wrote(SetRpm(20, 20), now + 0.01)
+    soon, late = odometry.predict(now + 0.3), odometry.predict(now + 1.0)
+    assert soon is not None
+    assert late is not None
+    assert late.twist.vx_mps > 0.2
+    assert soon.twist_covariance[0] < 0.1**2
+    assert late.twist_covariance[0] >= late.twist.vx_mps**2
+    assert late.twist_covariance[1] >= (late.twist.vx_mps / TRACK_M) ** 2
+
+
 @pytest.mark.parametrize("gap_s", [0.7, 0.9])
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
     """The robot drives a curve backward, and no report arrives for a while.
