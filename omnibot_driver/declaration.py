@@ -47,6 +47,7 @@ def declare(node: Node) -> dict[str, Any]:
         node.declare_parameter(
             parameter.name, values[parameter.name], _descriptor(parameter), ignore_override=True
         )
+    node.add_pre_set_parameters_callback(partial(_typed, table))
     node.add_on_set_parameters_callback(partial(_check, node, table))
     return values
 
@@ -121,6 +122,27 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
     if found:
         node.get_logger().info(f"calibration_file {path} sets {', '.join(found)}")
     return found
+
+
+def _typed(
+    table: parameters.Table, changed: Sequence[rclpy.Parameter]
+) -> Sequence[rclpy.Parameter]:
+    """Return the changed parameters, each in its declared type: 1.0 for the integer 1.
+
+    Otherwise a later reader that asks for a double would get an integer. A wrong value is returned
+    unchanged; ``_check`` refuses it.
+    """
+    return [_in_own_type(table, item) for item in changed]
+
+
+def _in_own_type(table: parameters.Table, item: rclpy.Parameter) -> rclpy.Parameter:
+    if (row := table.by_name.get(item.name)) is None:
+        return item
+    try:
+        value = row.check(item.value)
+    except ParameterError:
+        return item
+    return item if value is None else rclpy.Parameter(item.name, value=value)
 
 
 def _check(

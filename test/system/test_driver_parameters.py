@@ -15,7 +15,12 @@ from driver_process import PATIENCE_S, Driver
 from geometry_msgs.msg import Twist
 from probe import Probe
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.driver import in_plain_words
@@ -235,6 +240,17 @@ def test_tuning_changes_while_running_and_identity_does_not(
     result = set_parameter(probe, "linear_scale", text)
     assert not result.successful
     assert "linear_scale" in result.reason
+
+
+def test_a_parameter_of_type_double_stays_a_double(start_driver: Start, probe_of: Start) -> None:
+    """A client sets 1 instead of 1.0. Clients that ask for a double afterwards still get one."""
+    probe: Probe = probe_of(start_driver("sim://"))
+    probe.wait_for_state("nominal")
+    whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=1)
+    assert set_parameter(probe, "cmd_vel_timeout", whole).successful
+    names = ["cmd_vel_timeout"]
+    (value,) = probe.call(GetParameters, "get_parameters", names=names).values
+    assert value == real(1.0)
 
 
 def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
