@@ -113,7 +113,8 @@ def _sections(content: Any, above: str = "") -> Iterator[str]:
         if name == "ros__parameters":
             yield above.replace("/**", r"(/\w+)*").replace("/*", r"/\w+")
         else:
-            yield from _sections(below, f"{above}/{str(name).strip('/')}")
+            part = str(name).strip("/")  # empty for the root namespace
+            yield from _sections(below, f"{above}/{part}" if part else above)
 
 
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:

@@ -166,6 +166,7 @@ SECTION = "{name}:\n  ros__parameters:\n    max_linear_speed: 0.1\n"
         (SECTION.format(name="/robot1/*"), True),
         (SECTION.format(name="/**/omnibot_driver"), True),
         ("robot1:\n  omnibot_driver:\n    ros__parameters: {max_linear_speed: 0.1}\n", True),
+        ("/:\n  robot1:\n    omnibot_driver:\n      ros__parameters: {port: x}\n", True),
         (SECTION.format(name="/*"), False),
         (SECTION.format(name="omnibot_driver"), False),
         (SECTION.format(name="/robot2/omnibot_driver"), False),
