@@ -86,6 +86,28 @@ def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_r
     assert last(estimates) == close(trip.truth, 1e-3)
 
 
+@pytest.mark.parametrize("lost", [20, 25])
+def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
+    """The board restarts. Its first delta does not show that, because its count fits by chance.
+
+    The first pose shows the restart. It lies at the board's new origin, which is as near as the
+    robot may have driven in the gap. The odometry still does not move there.
+    """
+    odometry, estimates = Odometry(SETTINGS), []
+    for number in range(75):
+        estimates += odometry.displace(earth(0.004, 0.0), number * PERIOD_S)
+        if number % 5 == 4:
+            estimates += odometry.settle(PoseReading(0.004 * (number + 1), 0.0, 0.0))
+    before = last(estimates)
+    for number in range(75 + lost, 105 + lost):
+        still = replace(earth(0.0, 0.0), lost=lost if number == 75 + lost else 0)
+        estimates += odometry.displace(still, number * PERIOD_S)
+        if number % 5 == lost % 5:
+            pose = PoseReading(0.0, 0.0, 0.0, restarted=number < 81 + lost)
+            estimates += odometry.settle(pose)
+    assert last(estimates) == close(before, 0.06)
+
+
 def test_the_first_pose_must_be_confirmed_too() -> None:
     """The board's first pose is damaged.
 

@@ -243,10 +243,14 @@ class Odometry:
         """Return whether a pose is so near to the expected place that a restart changes nothing.
 
         The counter of a pose seems to begin anew also if the pose before it was damaged.
+
+        A restart takes longer than a period. So the board did not restart if no displacement was
+        lost since the last accepted pose. If displacements were lost, the result is False.
         """
         if self._board is None or self._restarted is not None or self._backlog:
             return False
-        return expected(self._board.way_to(told), self._track.uncertainty.gap)
+        gap = self._track.uncertainty.gap
+        return gap == NOTHING and expected(self._board.way_to(told), gap)
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the odometry must adopt the board's frame in which this pose is given.
