@@ -120,6 +120,8 @@ class Sequence:
         lost += wraps * WRAP
         late_s = abs((lost + 1) * period_s - elapsed_s)
         latest_late_s = LATE_S + DRIFT * elapsed_s
+        if 2 * latest_late_s > WRAP * period_s:
+            self._pose = None  # the number of wraps is not known, so poses cannot be compared
         from_zero = count * period_s <= elapsed_s + EARLY_S
         if lost and late_s > latest_late_s and (reconnected or from_zero):
             self._pose, self._left = None, (before, before_at, count)
@@ -148,7 +150,7 @@ class Sequence:
         """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
-        if before is None or self._delta is None:
+        if before is None or self._delta is None or self._reconnected:
             return Step(0)
         passed = (count - before) % WRAP * self._per_pose
         self._regular = self._regular or 0 < passed == counted

@@ -251,6 +251,37 @@ def test_the_pose_counter_goes_on_while_the_port_is_closed(lost: int) -> None:
             assert not sequence.pose(count // 5 % 256, count * 0.04).restarted
 
 
+@pytest.mark.parametrize("first", range(900, 1200, 50))
+def test_after_an_hour_the_pose_counter_does_not_tell_of_a_restart(first: int) -> None:
+    """The port is closed for an hour, and the board goes on. Its clock is slow by 0.3 %.
+
+    So the driver does not know how often the counter of the deltas has wrapped. The counter of the
+    poses then does not fit, which is not taken for a restart.
+    """
+    sequence = Sequence()
+    for count in [*range(first, first + 206), *range(first + 90_000, first + 90_050)]:
+        now = count * 0.04 * 1.003
+        if count == first + 90_000:
+            sequence.reconnect()
+        assert not sequence.delta(count % 256, now).restarted
+        if count % 5 == 4:
+            assert not sequence.pose(count // 5 % 256, now).restarted
+
+
+def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> None:
+    """The board restarts while the port is closed, and a pose is the first frame that arrives.
+
+    The difference of the pose counters means nothing, so the pose contains no known losses.
+    """
+    sequence = Sequence()
+    for count in range(206):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    sequence.reconnect()
+    assert sequence.pose(3, 205 * 0.04 + 60.0).lost == 0
+
+
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
     """The board sends a pose after every second delta, not after every fifth.
 
