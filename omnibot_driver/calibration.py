@@ -69,11 +69,12 @@ def save(path: Path, values: Mapping[str, Any]) -> None:
 
 
 def _read(path: Path) -> dict[Any, Any]:
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise ParameterError(
-            f"the calibration_file {path} is not a file, but a device or a pipe: give another path"
-        )
     try:
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise ParameterError(
+                f"the calibration_file {path} is not a file, but a device or a pipe: give another"
+                " path"
+            )
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}

@@ -96,6 +96,15 @@ def test_a_pipe_or_a_device_is_not_a_file(tmp_path: Path) -> None:
         calibration.load(Path("/dev/null"), PARAMETERS)
 
 
+def test_a_path_that_cannot_be_examined_is_reported(tmp_path: Path) -> None:
+    """The system refuses to examine the path, e.g. because its name is too long. An error says so.
+
+    The same error appears if the user may not enter the folder.
+    """
+    with pytest.raises(ParameterError, match=r"cannot be read .*too long"):
+        calibration.load(tmp_path / ("x" * 300), PARAMETERS)
+
+
 def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
