@@ -267,6 +267,14 @@ def test_messages_that_waited_once_are_not_a_step_of_a_clock(drive: Drive) -> No
     assert "latency_timer" in said(drive, "Timing", "The delay of imu/data_raw").advice
 
 
+def test_a_delay_that_ends_is_not_a_step_of_a_clock(drive: Drive) -> None:
+    """For 1.5 s, all messages arrive 0.5 s later. A few are lost, then the delays are as before."""
+    for topic in (drive.imu, drive.odom):
+        topic.late_s[(topic.stamp_s > 8.0) & (topic.stamp_s < 10.0)] += 0.5
+        topic.drop(9.5, 10.0)
+    assert not [one for one in judge(drive.log()) if "clock" in one.text]
+
+
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
     """Some messages have NaN or infinity.
 

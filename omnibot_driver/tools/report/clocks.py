@@ -40,8 +40,8 @@ def step(log: Log) -> ClockStep | None:
 def _step(series: Series) -> ClockStep | None:
     """Return the largest step between messages whose delays change suddenly and for good.
 
-    After a busy moment, the delays become as small as before. So the smallest delay does not show
-    such a moment.
+    After a busy moment, the delays become as small as before. So the smallest delays of all
+    messages before and after it do not differ.
     """
     rows = series.only(np.isfinite(series.stamp_s))
     rows = _by_stamp(rows)
@@ -50,7 +50,9 @@ def _step(series: Series) -> ClockStep | None:
     edges = np.concatenate([[0], edges, [len(rows)]])
     parts = [(a, b) for a, b in pairwise(edges) if b - a >= FEWEST]
     least_s = np.array([late_s[a:b].min() for a, b in parts])
-    steps_s = np.diff(least_s)
+    before_s = np.minimum.accumulate(least_s)[:-1]
+    after_s = np.minimum.accumulate(least_s[::-1])[::-1][1:]
+    steps_s = after_s - before_s
     if not len(steps_s) or np.abs(steps_s).max() < LEAST_STEP_S:
         return None
     largest = int(np.abs(steps_s).argmax())
