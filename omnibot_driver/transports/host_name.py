@@ -43,7 +43,7 @@ class HostName:
         if not self._is_name or now < self._heard_s + SILENT_S:
             return False
         if now >= self._asked_s + SILENT_S and not self._looks_up:
-            self._asked_s = now
+            self._asked_s, self._left = now, False  # the host was heard since an older result
             self._lookup = threading.Thread(target=self._look_up, name="omnibot-name", daemon=True)
             self._lookup.start()
         return self._left

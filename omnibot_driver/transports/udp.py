@@ -72,11 +72,12 @@ class UdpPorts:
         """
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
-        if self._name.has_moved():
-            raise LinkError(
-                f"the address of {self._host} has changed; the driver connects to the new address"
-            )
         if not self._ready:
+            if self._name.has_moved():
+                raise LinkError(
+                    f"the address of {self._host} has changed; the driver connects to the new"
+                    " address"
+                )
             return 0, b""
         ready = self._ready.pop()
         if ready == self._wake_up.descriptor:

@@ -269,6 +269,35 @@ def test_a_slow_lookup_does_not_hold_up_the_data(host: Host, names: Names, named
     names.gate.set()
 
 
+def test_an_answer_is_read_although_the_name_has_another_address(
+    host: Host, named: UdpPorts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lookup has shown another address. But the host has answered at the old one: it is read."""
+    named.write(((0, b"hello"),))
+    _, driver = host.ports[0].recvfrom(99)
+    host.ports[0].sendto(b"ok", driver)
+    monkeypatch.setattr(host_name.HostName, "has_moved", lambda _: True)
+    assert named.read() == (0, b"ok")
+    with pytest.raises(LinkError, match="has changed"):
+        named.read()
+
+
+def test_a_lookup_that_ends_after_an_answer_is_not_used(names: Names, named: UdpPorts) -> None:
+    """A lookup finds another address, but the host answers before the lookup ends.
+
+    When the host is silent again, the port stays open until the next lookup has ended.
+    """
+    names.wait_for(1, named)
+    while named._name._looks_up:
+        time.sleep(0.001)
+    named._name.heard()
+    named._name._left = True  # the lookup ends now
+    names.gate.clear()
+    for _ in range(20):
+        assert named.read() == (0, b"")
+    names.gate.set()
+
+
 def test_a_host_that_answers_is_not_looked_up(
     host: Host, names: Names, named: UdpPorts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
