@@ -6,6 +6,7 @@ A host may come back with another address, for example from DHCP. This module lo
 does not know what is sent to the host.
 """
 
+import contextlib
 import ipaddress
 import socket
 import threading
@@ -45,7 +46,8 @@ class HostName:
         if now >= self._asked_s + SILENT_S and not self._looks_up:
             self._asked_s, self._left = now, False  # the host was heard since an older result
             self._lookup = threading.Thread(target=self._look_up, name="omnibot-name", daemon=True)
-            self._lookup.start()
+            with contextlib.suppress(RuntimeError):  # no thread can be started now
+                self._lookup.start()
         return self._left
 
     @property

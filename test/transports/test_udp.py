@@ -298,6 +298,20 @@ def test_a_lookup_that_ends_after_an_answer_is_not_used(names: Names, named: Udp
     names.gate.set()
 
 
+def test_a_lookup_that_cannot_be_started_does_not_end_the_reading(
+    names: Names, named: UdpPorts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The system can start no thread at present, so no lookup begins. The port stays open."""
+
+    def start(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as exhausted:
+        exhausted.setattr(threading.Thread, "start", start)
+        assert named.read() == (0, b"")
+    names.wait_for(1, named)
+
+
 def test_a_host_that_answers_is_not_looked_up(
     host: Host, names: Names, named: UdpPorts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
