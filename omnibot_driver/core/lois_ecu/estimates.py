@@ -103,7 +103,7 @@ class Estimates:
         left_mps, right_mps = may_roll_mps
         rolled_m = left_mps * unheard_s, right_mps * unheard_s
         covariance = self._covariance(pose.yaw_rad, twist, rolled_m)
-        variances, displacement = motion.twist_variances(), self.pose.way_to(pose)
+        variances, displacement = motion.twist_variances(stamp_s), self.pose.way_to(pose)
         if unheard_s > 0.0:  # each wheel may now stand, or roll as fast as it can
             turning_radps = math.hypot(left_mps, right_mps) / self._settings.track_m
             variances = (

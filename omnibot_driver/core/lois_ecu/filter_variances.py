@@ -24,9 +24,19 @@ def pose_covariance(motion: SparseFilter, turn: float) -> Covariance:
     )
 
 
-def twist_variances(motion: SparseFilter, track_m: float) -> tuple[float, float]:
-    """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)²."""
+def twist_variances(
+    motion: SparseFilter, track_m: float, coasting_mps: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
+
+    ``coasting_mps``: standard deviation of the speed of the left and right wheel because it is
+    unknown when and how fast they decelerate. Both wheels have the same error of the time, so the
+    sign says in which direction a wheel rolls.
+    """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])
     turning = motion.variance_of([(left, -1 / track_m), (right, 1 / track_m)])
+    left_mps, right_mps = coasting_mps
+    speed += ((left_mps + right_mps) / 2) ** 2
+    turning += ((right_mps - left_mps) / track_m) ** 2
     return 1e-4 + speed, 1e-3 + turning

@@ -136,9 +136,10 @@ class MotionFilter:
         """Return the covariance of x, y and yaw."""
         return pose_covariance(self.filter, self.turn_sign / self.track_m)
 
-    def twist_variances(self) -> tuple[float, float]:
+    def twist_variances(self, now: float) -> tuple[float, float]:
         """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)²."""
-        return twist_variances(self.filter, self.track_m)
+        left, right = (wheel.coasting.unsure_mps(now, wheel.course.step_s) for wheel in self.wheels)
+        return twist_variances(self.filter, self.track_m, (left, right))
 
     @property
     def resting(self) -> bool:

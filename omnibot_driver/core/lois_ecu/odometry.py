@@ -204,7 +204,8 @@ class LoisOdometry:
             kind, scale = "duty", self._settings.duty_scale
             speeds_mps = command.left_percent / scale, command.right_percent / scale
         for index, speed_mps in enumerate(speeds_mps):
-            self._motion.wheels[index].course.command(now, kind, speed_mps)
+            rolls_mps = self._motion.speed_mps(index)
+            self._motion.wheels[index].command(now, kind, speed_mps, rolls_mps)
         left_mps, right_mps = self._may_roll_mps
         self._may_roll_mps = max(left_mps, abs(speeds_mps[0])), max(right_mps, abs(speeds_mps[1]))
 

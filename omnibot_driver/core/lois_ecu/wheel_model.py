@@ -58,6 +58,11 @@ class WheelModel:
         self._rpm_mps = 0.0
 
     @property
+    def commanded_mps(self) -> float:
+        """Speed of the last command, in m/s. The motor may not follow this command yet."""
+        return self._heard[1]
+
+    @property
     def counting(self) -> bool:
         """Whether the public firmware counts this wheel's ticks."""
         return self.hidden_mps > 0.0

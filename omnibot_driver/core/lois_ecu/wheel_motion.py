@@ -9,7 +9,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Final
 
-from omnibot_driver.core.lois_ecu.wheel_model import WheelModel
+from omnibot_driver.core.lois_ecu.coasting import COAST_PART, COASTING_S, DRY_MPS2, Coasting
+from omnibot_driver.core.lois_ecu.wheel_model import HEARD_S, CommandKind, WheelModel
 
 WAY, SPEED, PUSH, COUNT, HELD = range(5)
 PER_WHEEL: Final = 5
@@ -44,14 +45,6 @@ WINDUP_M: Final = 0.08
 integral is that of target minus measured speed."""
 DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
-COASTING_S: Final = 0.15
-DRY_MPS2: Final = 0.7
-"""Deceleration of a wheel without power by dry friction, in m/s².
-
-It comes in addition to an exponential decay of the speed. ``COASTING_S`` is the time constant of
-this decay, in s.
-"""
-COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
@@ -118,6 +111,8 @@ class Wheel:
     def begin_again(self) -> None:
         """Forget all commands and history, because the board has just started."""
         self.course = WheelModel(self.course.step_s)
+        self.coasting = Coasting(-math.inf, 0.0)
+        """The wheel after the last command that takes its power away."""
         self.restless_mps = 0.0
         """Largest recent difference between target and speed, in m/s. It decays with time."""
         self.unsettled_mps = 0.0
@@ -155,6 +150,12 @@ class Wheel:
         It can conclude this, for example, when the board repeats the same measured speed.
         """
         self.blind = False
+
+    def command(self, at_s: float, kind: CommandKind, target_mps: float, speed_mps: float) -> None:
+        """Record that a command was written at ``at_s`` while the wheel had ``speed_mps``."""
+        if target_mps * speed_mps <= 0 < self.course.commanded_mps * speed_mps:
+            self.coasting = Coasting(at_s + HEARD_S, speed_mps)
+        self.course.command(at_s, kind, target_mps)
 
     def begin_anew(self, speed_mps: float) -> None:
         """Record that the controller was reset while the wheel had the speed ``speed_mps``."""

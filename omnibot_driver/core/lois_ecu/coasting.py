@@ -1,0 +1,51 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Speed of a wheel that rolls on without power.
+
+Input: speeds and times.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+COASTING_S: Final = 0.15
+DRY_MPS2: Final = 0.7
+"""Deceleration of a wheel without power by dry friction, in m/s².
+
+It comes in addition to an exponential decay of the speed. ``COASTING_S`` is the time constant of
+this decay, in s.
+"""
+COAST_PART: Final = 0.35
+"""Assumed standard deviation of the deceleration, as a fraction of the deceleration."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coasting:
+    """A wheel that coasts after a command.
+
+    ``heard_s``: time in s at which the board reads the command. The power ends at the next step of
+    the speed controller.
+
+    ``speed_mps``: speed at this time, with sign.
+    """
+
+    heard_s: float
+    speed_mps: float
+
+    def unsure_mps(self, now: float, step_s: float) -> float:
+        """Return the standard deviation of the speed at ``now``, with the sign of the speed.
+
+        It is half the difference between the speeds of two wheels. One wheel loses its power at
+        once and decelerates fast. The other one loses it after ``step_s``, the whole period of the
+        speed controller, and decelerates slowly.
+        """
+        age_s = now - self.heard_s
+        slow_mps = self._speed_after((1 + COAST_PART) * age_s)
+        fast_mps = self._speed_after((1 - COAST_PART) * (age_s - step_s))
+        return math.copysign((fast_mps - slow_mps) / 2, self.speed_mps)
+
+    def _speed_after(self, coasting_s: float) -> float:
+        dry_mps = DRY_MPS2 * COASTING_S
+        kept = math.exp(-max(coasting_s, 0.0) / COASTING_S)
+        return max((abs(self.speed_mps) + dry_mps) * kept - dry_mps, 0.0)
