@@ -141,9 +141,9 @@ def test_no_frame_length_is_refused_at_start(length: int) -> None:
 def test_a_difference_is_found_at_start(
     monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
 ) -> None:
-    """A constant part of the driver's messages is wrong.
+    """The driver's serializer writes a wrong value in a constant part of a message.
 
-    The comparison with rclpy at start finds this.
+    At start, the comparison with rclpy's bytes finds this.
     """
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))

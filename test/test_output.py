@@ -2,7 +2,8 @@
 
 """Tests of output to the terminal.
 
-The driver never waits for the terminal, and loses only text that cannot be printed.
+The driver never waits for the terminal. It loses a text only if the terminal or the disk does not
+accept it.
 """
 
 import fcntl

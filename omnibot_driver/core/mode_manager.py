@@ -77,10 +77,13 @@ They save time, because Python 3.11 looks up Enum members slowly.
 
 
 class ModeManager:
-    """The mode that was requested from a board, and the packets and data that lead to this mode.
+    """The manager of a board's mode.
+
+    It sends the packets that start, pause or reset the board, and repeats them until data show that
+    the board has obeyed.
 
     * ``run``: whether to start the board at each connection. If False, the board keeps its mode.
-    * ``answers``: the answers to requests that the session has not passed on yet.
+    * ``answers``: answers to requests. They stay here until the reporter takes and clears them.
     """
 
     def __init__(self, board: Board, *, run: bool) -> None:

@@ -145,7 +145,7 @@ class SafetyStops:
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """Check for how long the board has been silent, and react.
+        """Check how long the board has been silent, and react.
 
         After a short silence (``unheard_s``), stop the robot. After a long silence (``silence_s``),
         also forget the board's mode.

@@ -21,7 +21,7 @@ LEFT_OUT = {
     "~/pause with true, then false",
     "the driver hangs and continues (SIGSTOP, SIGCONT)",
 }
-"""Cases that this module omits, because this module or test/system tests a similar case.
+"""Cases that this module omits. A similar case is tested here or in test/system.
 
 Tests that are similar to the last four cases are in test_driver_commands, test_driver_services and
 test_driver_guard. "e-stop by topic" is also similar to "1,000 releases a second by topic", which

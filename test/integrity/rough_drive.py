@@ -25,7 +25,7 @@ STEEPEST_PWM: Final = 200.0
 """Greatest effort against a slope, in PWM steps: 5 % of the motors' full effort."""
 HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
-"""Greatest effort of a push against a driving robot, in PWM steps."""
+"""Greatest force of a person's push, in PWM steps. A motor effort of this size balances it."""
 FASTEST_CARRY_MPS: Final = 0.5
 """Greatest speed in m/s at which people carry a robot away. The robot's motors are at rest then."""
 SECONDS_BETWEEN_HANDS: Final = 20.0

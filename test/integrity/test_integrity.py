@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of the integrity report. Its streams are long enough to test every limit."""
+"""Tests of the limits in the integrity report, with shorter streams than the report uses."""
 
 from random import Random
 

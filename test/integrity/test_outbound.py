@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of the outbound report, and tests of the report's judge."""
+"""Short trials of how boards read the driver's bytes from a damaged line; tests of the judge.
+
+The outbound report (``outbound.py``) has the long trials. The judge compares what the board
+understood with what the driver sent.
+"""
 
 from copy import copy
 from dataclasses import replace

@@ -70,13 +70,16 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Record that a sender of commands was active at ``now``, which can prolong a refusal.
+        """Let the wait for a time without commands begin again, if motion is still refused.
 
         After a first stop by the monitor, motion is refused until no command has arrived for
-        ``timeout_s``. If the refusal still continues at ``now``, the wait for ``timeout_s`` begins
-        again. Call this method when a command is refused, and after a stall of this process.
+        ``timeout_s``. This method begins this wait again at ``now``. It has no effect on a refusal
+        that has ended before.
 
-        ``stalled_s``: length of the stall, in s. A stall is not regarded as time without commands.
+        Call this method when a command is refused, because its sender is still active. Call it also
+        after a stall of this process, because commands may have arrived unnoticed in the stall.
+
+        ``stalled_s``: length of the stall, in s. The stall does not count as time without commands.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now

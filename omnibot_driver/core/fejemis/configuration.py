@@ -43,9 +43,10 @@ the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute. 
 the larger one: the board prints few digits, so the relative error of a small number can be above
 ``NEAR``."""
 HALF: Final = 0.51
-"""Tolerance for the same comparison as ``NEAR``, in units of the last digit that the board prints.
-The comparison uses it if it is smaller than the tolerance from ``NEAR`` and ``DIGIT``. It is a
-little more than half a unit, because the board's numbers have single precision."""
+"""Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last digit that the
+board prints. Half a unit is the rounding error of a printed number. The limit is a little larger,
+because the board's numbers have single precision. If the last digit is unknown, there is no limit.
+"""
 
 
 class Configuration:

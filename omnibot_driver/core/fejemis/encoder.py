@@ -2,7 +2,8 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-The caller sends the packets with these lines, and then passes the packets to ``Encoder.meaning``.
+The caller sends the packets that ``Encoder.encode`` returns, and then passes the same packets to
+``Encoder.meaning``.
 
 The module knows geometry and lines; it does not know when lines are sent.
 """

@@ -72,8 +72,8 @@ class ImuSamples:
         self._block_s, self._block_from, self._block_at_s = math.inf, 0, 0.0
         self._delay_s = 0.0
         self._guessed = 0
-        """Number of samples that are counted as lost only because two successive samples seemed to
-        be late. No later sample has confirmed this yet."""
+        """Number of samples that are counted as lost, although this is not certain yet: two
+        successive samples seemed to be late. A later sample will show whether it is right."""
 
     def reading(self, pair: Pair) -> ImuReading:
         """Convert a pair of lines to a reading in SI units."""

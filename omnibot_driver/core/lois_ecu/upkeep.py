@@ -92,10 +92,10 @@ class Upkeep:
         )
 
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
-        """Return the bytes that change the terminal mode, or no bytes if nothing is due.
+        """Return the bytes to write now to change a mode, or no bytes if nothing is due.
 
-        The first calls return zero set-points, because the robot must be at rest. Later calls
-        return the lines that set the mode.
+        The robot must be at rest before some changes. For these changes, the first calls return
+        zero set-points. Later calls return the lines that set the terminal mode.
         """
         change, with_sum = self.change, self.writer.settings.with_sum
         if stop := change.stops(now, stands=stands, cleared=self._points.cleared):

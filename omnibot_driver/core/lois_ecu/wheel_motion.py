@@ -49,12 +49,12 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Time in s from which the error of a wheel's distance is computed after an early halt.
+"""Factor in s for the uncertainty of a wheel's distance after an early halt.
 
-A halt is early if it comes soon after a new set-point, when the wheel has not yet reached the speed
-that the filter assumed. The standard deviation of the distance is this time, multiplied by
-``unsettled_mps``. The first number is for the board's own gains, the second for gains that the user
-has set.
+A halt is early if it comes soon after a new set-point. The wheel has then not yet reached the speed
+that the filter assumed, so its distance is uncertain. The standard deviation of the distance in m
+is this factor, multiplied by ``unsettled_mps``. The first factor is for the board's own gains, the
+second one for gains that the user has set.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -171,11 +171,12 @@ class Wheel:
         return self.restless_mps < STEADY_PART * abs(self.course.target_mps)
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
-        """Return 1 if forward motion increases the tick count, -1 if it decreases the count.
+        """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
-        Return 0 while the board does not count.
+        The factor is -1 if the wheel rolls backward, but the count still increases. It is 0 while
+        the board does not count.
 
-        ``signed``: whether ticks count in both directions.
+        ``signed``: whether the count decreases when the wheel turns backward.
         """
         if signed:
             return 1.0
@@ -189,7 +190,7 @@ class Wheel:
 
         ``holds``: whether the board keeps the last measured speed of a wheel at rest.
 
-        ``signed``: whether ticks count in both directions.
+        ``signed``: whether the count decreases when the wheel turns backward.
         """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]

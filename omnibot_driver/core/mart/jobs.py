@@ -222,7 +222,7 @@ class Jobs:
             self._finish(False, f"the controller did not answer {word.text}; {advice}")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
-        """End the docking job if its controlled move is the one that has just ended.
+        """End the docking job if the controlled move that has just ended belongs to it.
 
         ``reply``: the server's reply to the move.
         """

@@ -254,7 +254,7 @@ class Expectation:
         return (cost if on_beat else cost + OFF_BEAT), after
 
     def learn(self, frame: ImuFrame, last: ImuFrame) -> None:
-        """Learn the sensor's scatter from two consecutive accepted frames."""
+        """Learn how much the IMU's words scatter, from two consecutive accepted frames."""
         (x, y, z), (px, py, pz) = frame.accel, last.accel
         (u, v, w), (pu, pv, pw) = frame.gyro, last.gyro
         d_accel = max(abs(x - px), abs(y - py), abs(z - pz))

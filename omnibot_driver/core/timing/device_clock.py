@@ -205,7 +205,11 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return the correction of the tick number, in ticks, by the counter in a displacement."""
+        """Return how many ticks to add to the tick number, as a displacement's counter shows.
+
+        The result is negative if the tick number is too high. It is 0 if there is no earlier
+        displacement, or if this one has no duration.
+        """
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -264,10 +268,12 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """Record the delay ``lag_s`` of a new tick, which was read at ``now``.
+        """Record the delay of a new tick, and the time ``now`` at which the tick was read.
 
-        ``lag_s``: arrival of the tick minus its time by the fitted clock, in s. If the previous
-        tick was read less than half a period before, this delay replaces that of the previous tick.
+        If the previous tick was read less than half a period earlier, it had waited to be read. The
+        new delay then replaces the delay of the previous tick.
+
+        ``lag_s``: the delay in s. It is the tick's arrival minus its time by the fitted clock.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s

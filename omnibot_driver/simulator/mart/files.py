@@ -79,7 +79,10 @@ def note_of(server: "ServerState", motion: Motion) -> FileNote:
 
 
 def _turn_record(motion: Motion) -> tuple[str, ...]:
-    """Return the first lines of the file of a controlled spin, without the date."""
+    """Return the first lines of the log file of a controlled spin.
+
+    The caller inserts the date after the first of these lines.
+    """
     return (
         "MC Spin sensor data log",
         f"Target motion (\u00b0): {motion.target:.2f}",

@@ -235,7 +235,7 @@ class MartServer(ServerState):
         self._stop_queue.clear()
 
     def zero_heading(self) -> None:
-        """Set the relative heading to zero, as at the start of RM."""
+        """Set the relative heading to zero. The server does this when a forward drive starts."""
         self.imu.drift(self.now_s, integrates=False)
         self.imu.heading_deg = 0.0
 

@@ -30,7 +30,7 @@ def integer(text: str) -> int:
 
 
 def fields(text: str) -> list[str]:
-    """Return, for each blank in the text, everything after this blank.
+    """Return, for each space character in the text, everything after it.
 
     ``integer`` reads the number at the beginning of such a text.
     """

@@ -4,7 +4,7 @@
 
 A tilt of the sensor, a slope of the floor, and a bias of the accelerometer at right angles to
 gravity have the same effect on the readings. The readings do not show which of them is the cause.
-Therefore, of the accelerometer's bias, only the part along gravity is found.
+Therefore, only the part of the accelerometer's bias along gravity is found.
 
 This module knows readings; it does not know how they are recorded.
 """

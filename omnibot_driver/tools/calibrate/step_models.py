@@ -23,7 +23,7 @@ Source: manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md.
 """
 
 Turned = Callable[[Array, Array], Array]
-"""A function that returns the angle turned, in rad, after a step of the rate to 1 rad/s.
+"""A function that returns the wheel's angle in rad after its set-point has stepped to 1 rad/s.
 
 Arguments: the model's parameters without the gain, and times after the step in s.
 """

@@ -50,7 +50,7 @@ SAID: dict[str, Row] = {
     "start": Row("start", "services ~/start, ~/estop"),
     "off": Row("off 10", "service ~/power_off"),
     "on": Row("on", "service ~/start calls a power off back"),
-    "leave": Row("leave", "when a board is found: what others have subscribed"),
+    "leave": Row("leave", "when a board is found: ends the subscriptions of other programs"),
     "gyroc": Row("gyroc", "service ~/calibrate_gyro"),
     "acccal2": Row("acccal2", "service ~/calibrate_accelerometer"),
     "magcal": Row("magcal 1 2 3 1 0 0 0 1 0 0 0 1", "parameter mag_calibration"),

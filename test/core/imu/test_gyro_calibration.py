@@ -52,7 +52,7 @@ def stand(
 
     ``force``: the specific force in every reading of the accelerometer, in m/s².
 
-    ``rolling``: every displacement's x and y in m and turn in rad. None: no displacements.
+    ``rolling``: x and y in m, and turn in rad, of each displacement. None: no displacements.
     """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):

@@ -75,7 +75,7 @@ VARIED = (
 )
 """Names of motions in ``test/integrity/lois_odometry.py``: drives of 5 m, and turns of 80° to 400°.
 
-The seed of a drive determines its speed, and its curve or angle.
+The seed of a motion sets its speed. It also sets the curvature of a curve, or the angle of a turn.
 """
 
 

@@ -64,8 +64,8 @@ def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
     """At the end of a turn, the stop overtakes an encoder query.
 
     So the reply to the stop, which contains the angle, comes before the encoder count. The driver
-    does not use the count as the angle: it is far from the expected angle. It also does not learn
-    the motors' speed from the count.
+    does not use the count as the angle, because the count is far from the expected angle. The
+    driver also does not learn the motors' speed from the count.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board

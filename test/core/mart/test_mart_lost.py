@@ -137,9 +137,10 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
     """The server's process is stopped while the robot is at rest, and continues after 5 s.
 
-    In these 5 s, the driver uses the stop port. Then the server answers the queries that have
-    waited. The driver does not take the values in these replies for results of a motion, so it
-    drives the robot again.
+    In these 5 s, the driver gets no replies, so it sends stop commands to the stop port. Then the
+    server answers the queries that have waited. A reply to a stop command would show that the stop
+    port may hang, and the driver would refuse motion. The driver does not take the late replies for
+    such a reply. So it accepts the next command, and the robot drives.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

@@ -33,7 +33,7 @@ def plain(twist: BodyTwist) -> tuple[float, float, float]:
 def test_what_lies_between_rest_and_the_set_points_is_inside(
     setpoints: list[tuple[BodyTwist, float]],
 ) -> None:
-    """Any weighted mean of the recent set-points and rest is inside the envelope."""
+    """Any weighted mean of the recent set-points and zero velocity is inside the envelope."""
     weight = max(1.0, sum(part for _, part in setpoints))
     motion = BodyTwist(
         sum(part * each.vx_mps for each, part in setpoints) / weight,

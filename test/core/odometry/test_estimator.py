@@ -64,7 +64,10 @@ def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
 def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
     moves: list[Pose], initial: float, signs: tuple[int, int, int]
 ) -> None:
-    """The board has any initial heading and any axis signs. Odom is the robot's true motion."""
+    """The board has any initial heading and any axis signs.
+
+    The published odometry equals the robot's true motion.
+    """
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
     attach(odometry, trip.pose)
     for number, move in enumerate(moves):

@@ -99,7 +99,10 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_an_empty_read_changes_nothing() -> None:
-    """An empty read after each read does not change the readings."""
+    """Two decoders get the same reads, and one of them also gets an empty read after each.
+
+    Both return the same readings.
+    """
     one, other = OmniBot(OmniBotSettings()), OmniBot(OmniBotSettings())
     for now, data in islice(pieces(), TICKS):
         assert one.receive(data, now) == other.receive(data, now)
