@@ -20,7 +20,8 @@ The measured value is divided by the requested or the expected one, whichever is
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
-The word SLOW in a request doubles the times per degree and inch.
+The word SLOW in a request doubles the times per degree and inch. The times per degree and inch are
+those of a robot with the default settings; ``Done.slowness`` adapts them to another robot.
 """
 LEAST_PACE: Final = 0.65
 """Slowest motion of one run of a move, as a fraction of the usual speed of this move."""
@@ -52,6 +53,9 @@ class Done:
 
     ``stopped_again``: whether the driver has sent a stop after the move, to end a possible second
     run.
+
+    ``slowness``: usual time that the robot needs for a distance or turn, divided by the time that
+    a robot with the default settings needs.
     """
 
     request: Request
@@ -62,6 +66,7 @@ class Done:
     completed: bool
     stopped_again: bool
     expected: float
+    slowness: float = 1.0
 
     @property
     def is_straight(self) -> bool:
@@ -92,7 +97,7 @@ class Done:
     def usual_s(self) -> float:
         """The usual duration of the move, in s."""
         number = float(self.request.data.split()[-1])
-        slow = 2 if b"SLOW" in self.request.data.split() else 1
+        slow = self.slowness * (2 if b"SLOW" in self.request.data.split() else 1)
         return SETTLES_S + slow * number * (S_PER_IN if self.is_straight else S_PER_DEG)
 
     @property

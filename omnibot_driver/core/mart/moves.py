@@ -17,6 +17,7 @@ from omnibot_driver.core.mart.finished_move import FULL, Done
 from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, Move, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
 from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
@@ -203,6 +204,10 @@ class Moves(Asking):
 
     def _done(self, move: Request, now: float, *, completed: bool) -> Done:
         free_s = min(now, self._port_free_s)
+        ours, usual = self._settings, MartSettings()
+        slowness = usual.speed_per_unit / ours.speed_per_unit
+        if move.word in (words.MCR, words.MCL):
+            slowness *= ours.track_m / usual.track_m
         return Done(
             move,
             self.odometry.moved_m,
@@ -212,6 +217,7 @@ class Moves(Asking):
             expected=abs(self._surplus.expected(move)),
             completed=completed,
             stopped_again=self._copies_stopped_s >= self._rested_s,
+            slowness=slowness,
         )
 
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:

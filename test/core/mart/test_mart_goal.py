@@ -376,3 +376,17 @@ def test_a_goal_ends_after_a_move_in_which_the_wheel_counts_the_wrong_way(
     assert len(moves) == 1
     assert bench.robot.stands
     assert any("`encoder_inverted`" in notice for notice in bench.notices)
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source", "documented"])
+def test_a_turn_of_a_slow_robot_is_not_taken_for_two_runs(firmware: Firmware) -> None:
+    """The robot is half as fast as usual, and `linear_scale` says so. The network is good.
+
+    A turn takes long, but the driver does not conclude that it may have run twice.
+    """
+    settings = MartSettings(speed_per_unit=0.004)
+    bench = MartBench(firmware, settings=settings, speed_mps_per_unit=0.004).ready()
+    bench.go_to(0.0, 0.0, 2.8)
+    bench.run(20.0)
+    assert bench.board._pilot.goal_progress.startswith("over")
+    assert bench.odometry[-1].covariance.yaw_yaw < 0.05**2
