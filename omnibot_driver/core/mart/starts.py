@@ -186,6 +186,7 @@ class Starts(FailedStarts):
         why = f"the check of the IMU failed: {reason or 'the server gives no reason'}"
         if reason == words.CONFLICT:
             why += "; look for another program that commands the robot"
+            self.jobs.cancel(why)
             self._switch_off.refused()
             self.motion = Motion.UNKNOWN
             self._halt(now, why)

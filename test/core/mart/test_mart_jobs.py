@@ -148,3 +148,25 @@ def test_a_refused_zero_command_ends_a_docking() -> None:
     assert b"SL" in bench.said()
     assert bench.board._pilot.jobs.job is None
     assert "the docking is cancelled: cmd_vel" in bench.notices[-1]
+
+
+def test_a_calibration_that_another_motion_prevents_names_the_other_program() -> None:
+    """The server refuses the check of the IMU before SB, because another motion is in progress.
+
+    The answer of the service names this reason. It does not advise to stop sending commands.
+    """
+    bench = MartBench().ready()
+    real = bench.robot.receive
+
+    def receive(data: bytes, now: float, channel: int) -> None:
+        if data == b"RST IMU":
+            refusal = b"fail conflicting action in progress"
+            bench.robot.network[0].from_board.send(refusal, bench.robot.board.now_s)
+        else:
+            real(data, now, channel)
+
+    bench.robot.receive = receive  # type: ignore[method-assign]
+    done = bench.job(Job.BIAS)
+    assert not done.success
+    assert "conflicting action in progress" in done.message
+    assert "another program" in done.message
