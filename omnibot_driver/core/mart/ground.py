@@ -277,6 +277,16 @@ class Ground:
         odometry = self.odometry
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 
+    @property
+    def _may_run_on(self) -> bool:
+        """Whether the motors may still run on, although the server knows of no motion.
+
+        This is so after a drive, until a count shows that the robot is at rest.
+        """
+        unseen = self._stood_s < max(self.appeared_s, self._started_s)
+        driven = self._started_s > -math.inf and not self._moved_last
+        return self.state is State.STILL and unseen and driven
+
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 

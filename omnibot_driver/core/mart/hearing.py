@@ -124,7 +124,7 @@ class Hearing(Measuring):
                 self._present_s = now
             if greeted_s >= self._started_s + self._delay_s:  # HELLO has not overtaken the start
                 network.hurry(now + min(self._delay_s, 3 * max(self._trip_s, now - greeted_s)))
-        elif self.state in ROLLING and network.answered_trip_s < SLOW_S:
+        elif (self.state in ROLLING or self._may_run_on) and network.answered_trip_s < SLOW_S:
             network.hurry(now)
 
     @property

@@ -136,9 +136,10 @@ class Measuring(Starts):
         unknown = self._stood_s < max(self.appeared_s, self._started_s)
         if unknown:
             self.odometry.lose_turn()
-        if unknown and self._negative_sweep and now - self._swept_s < 2.0:
+        swept = self._negative_sweep and self._swept_s > max(self._started_s, self._stood_s)
+        if unknown and swept:
             self._stray_s = now
-            self._rescue = True
+            self._rescue, self._negative_sweep = True, False  # if this fails: sweep again
             self._switch_off.doubt()
             self._notice(
                 "robot moves, but the server knows of no motion; the driver switches the motors"

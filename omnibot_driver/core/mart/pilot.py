@@ -272,6 +272,8 @@ class Pilot(Hearing):
         due = self._polls.due(self.state, now)
         if self.state is State.STILL and self._suspects_copy:
             due.sort(key=lambda word: word is not words.ENC)
+        elif self._may_run_on:
+            due.sort(key=lambda word: word not in (words.RMRA, words.ENC))
         for word in due:
             if word is words.ENC and self._waits_for_heading():
                 continue

@@ -47,12 +47,15 @@ class SwitchOff:
         not.
         """
         self.needed = self.underway = False
-        self._supported = True
+        self._supported, self._refused = True, False
         self._misses = 0
 
     def doubt(self) -> None:
-        """Record that a motor may be on, although the server knows of no motion."""
-        self.needed = self._supported
+        """Record that a motor may be on, although the server knows of no motion.
+
+        MCS is then tried even if it was not answered before: the network may have lost the replies.
+        """
+        self.needed = not self._refused
 
     def begins(self, *, straight: bool) -> None:
         """Record that a motion begins, which overwrites the units of both motors.
@@ -84,7 +87,9 @@ class SwitchOff:
         """
         self.needed, self._misses = False, 0
         if isinstance(reply, Fail) and reply.reason != CONFLICT:
-            self._supported = False
+            self._supported, self._refused = False, self._refused or word is MCS
+        elif word is MCS:
+            self._supported = True
         self.underway = word is MCS and self._supported
 
     def missed(self, word: Word) -> bool:
@@ -92,7 +97,7 @@ class SwitchOff:
 
         After MOST_MISSES unanswered requests in a row, the driver no longer repeats the request,
         and allows motions again. If this request was MCS, the driver does not use MCS again until
-        the next connection.
+        the next connection, or until the motors may run on without a motion (``doubt``).
 
         The server may still execute an unanswered MCS later, and then refuses the next motion. If
         this happens, the driver sends MSM, which ends the direct control by MCS.

@@ -293,3 +293,23 @@ def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_lose
     assert bench.until_it_stands() < 4.0
     bench.run(1.0)
     assert bench.robot.stands
+
+
+@pytest.mark.parametrize("seed", [2, 6, 14])
+def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
+    """The server restarts in a drive. It has no MCS, and the network is bad.
+
+    The driver needs some time to see the motion between two encoder counts. It then stops the
+    robot by a turn of 1 degree, however long ago the stops found no motion.
+    """
+    network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
+    bench = MartBench("documented", network, seed=seed).ready()
+    for _ in range(60):
+        bench.command(0.3, 0.0, 0.1)
+        if not bench.robot.stands:
+            break
+    bench.command(0.3, 0.0, 0.7)
+    assert not bench.robot.stands
+    bench.server.restart(0.5)
+    bench.command(0.0, 0.0, 0.5)
+    assert bench.until_it_stands() < 8.5

@@ -15,8 +15,11 @@ from mart_goals import drops, reach
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings as Settings
+from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.replies import Fail
 from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.switch_off import SwitchOff
 from omnibot_driver.simulator.mart import Firmware
 
 pytestmark = pytest.mark.slow
@@ -370,3 +373,20 @@ def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> 
     assert released_s
     assert any("still reports a motion" in text for text in bench.notices)
     assert not bench.server.hung
+
+
+def test_mcs_is_tried_again_after_lost_replies_but_not_after_a_refusal() -> None:
+    """The network loses four replies to MCS, so the driver gives up. Then motors may run on again.
+
+    The driver tries MCS once more. After "command not supported", it does not.
+    """
+    switch_off = SwitchOff()
+    switch_off.doubt()
+    assert [switch_off.missed(words.MCS) for _ in range(4)] == [False, False, False, True]
+    switch_off.begins(straight=True)
+    assert not switch_off.needed
+    switch_off.doubt()
+    assert switch_off.needed
+    switch_off.answered(words.MCS, Fail(words.UNSUPPORTED))
+    switch_off.doubt()
+    assert not switch_off.needed
