@@ -16,7 +16,7 @@ from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import Conversation
 from omnibot_driver.core.mart.goal import Move, Surplus
 from omnibot_driver.core.mart.health import Health
-from omnibot_driver.core.mart.imu_proof import ImuProof
+from omnibot_driver.core.mart.imu_proof import PROBE_S, ImuProof
 from omnibot_driver.core.mart.jobs import Jobs
 from omnibot_driver.core.mart.odometry import MartOdometry
 from omnibot_driver.core.mart.polls import Polls
@@ -231,7 +231,7 @@ class Ground:
         if self.heard_s <= self._served_s:
             most_s = ABSENT_BUSY_S  # the driver has waited for pieces of a file
         elif self.state is State.CHECKING:
-            most_s += self.imu.word.takes_s
+            most_s += PROBE_S[self.imu.word] - PROBE_S[words.RESET]
         elif self.state not in (State.STILL, *ROLLING):
             most_s = ABSENT_BUSY_S
         in_move = self._stopping is not None and self._stopping.move is not None

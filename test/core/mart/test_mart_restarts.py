@@ -295,6 +295,24 @@ def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_lose
     assert bench.robot.stands
 
 
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+@pytest.mark.parametrize("boot_s", [0.55, 0.6, 0.65, 0.7])
+def test_a_short_restart_while_the_imu_is_checked_is_noticed(
+    boot_s: float, firmware: Firmware
+) -> None:
+    """The server restarts 0.08 s after RST IMU, and answers HELLO soon.
+
+    The silence is short, but the driver starts no motion before the server is ready.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command_until(0.3, 0.0, lambda: b"RST IMU" in bench.said()[-1:])
+    bench.run(0.08)
+    bench.server.restart(boot_s)
+    bench.command(0.3, 0.0, 5.0)
+    assert not bench.server.crashed
+    assert not bench.robot.stands
+
+
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
     """The server restarts in a drive. It has no MCS, and the network is bad.
