@@ -128,10 +128,14 @@ class UdpPorts:
         self._wake_up.close()
 
     def _connect(self, channels: int) -> None:
-        """Connect the sockets of all channels to the same address of the host."""
-        family, kind, protocol, _, (address, _, *rest) = socket.getaddrinfo(
-            self._host, self._port, type=socket.SOCK_DGRAM
-        )[0]
+        """Connect the sockets of all channels to the same address of the host.
+
+        Motor controllers seldom know IPv6. So if the host also has an IPv4 address, this is used.
+        """
+        found = socket.getaddrinfo(self._host, self._port, type=socket.SOCK_DGRAM)
+        family, kind, protocol, _, (address, _, *rest) = min(
+            found, key=lambda place: place[0] != socket.AF_INET
+        )
         self._name = HostName(self._host, str(address))
         for number in range(channels):
             ours = socket.socket(family, kind, protocol)

@@ -224,6 +224,17 @@ def names(monkeypatch: pytest.MonkeyPatch) -> Names:
     return names
 
 
+def test_a_host_with_both_kinds_of_address_is_reached_by_ipv4(host: Host, names: Names) -> None:
+    """The name service names an IPv6 address first, and the host listens only at its IPv4 address.
+
+    The datagrams reach the host.
+    """
+    names.addresses = ["::1", "127.0.0.1"]
+    with contextlib.closing(UdpPorts(f"udp://robot.local:{host.number}")) as transport:
+        transport.write(((0, b"hello"),))
+        assert host.ports[0].recv(9) == b"hello"
+
+
 @pytest.fixture
 def named(host: Host, names: Names) -> Iterator[UdpPorts]:
     transport = UdpPorts(f"udp://robot.local:{host.number}", 2)
