@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from omnibot_driver import boards, messages
+from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.core.geometry.omni import OmniKinematics
@@ -105,6 +106,18 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
     assert sum(map(len, table.sections.values())) == len(table.rows)
     assert (table.board, table.by_name["board"].choices) == (name, (name,))
     assert boards.owners_of("port") == list(boards.PROFILES)
+
+
+@pytest.mark.parametrize("name", boards.PROFILES)
+def test_each_board_has_every_member_of_the_protocol(name: str) -> None:
+    """The common code uses only members of the class ``Board``. Each board has all of them.
+
+    A board need not inherit from this class.
+    """
+    board = boards.load(name).make(boards.check_all({"board": name}))
+    members = {*vars(Board), *Board.__annotations__}
+    missing = [each for each in members if not each.startswith("_") and not hasattr(board, each)]
+    assert missing == []
 
 
 @pytest.mark.parametrize("name", boards.PROFILES)

@@ -83,7 +83,7 @@ class OmniBot:
     clock = None
     wake_at = math.inf
     shows_standstill = True
-    refusal = reset_refusal = start_refusal = ""
+    refusal = reset_refusal = start_refusal = own_motion = ""
 
     def __init__(self, settings: OmniBotSettings) -> None:
         self._schedule = Schedule(settings.delta_period_s)
