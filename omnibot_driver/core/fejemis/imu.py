@@ -41,8 +41,8 @@ After a stall, hundreds of samples arrive at once, and all of them are late. The
 than one block. Otherwise, there would be no block with a sample that was on time.
 """
 EARLY_S: Final = 5e-4
-"""If a sample seems early by more than this time, in s, no earlier sample was lost: the two samples
-before it were only late."""
+"""If a sample seems early by more than this time, in s, fewer samples were lost before it than
+assumed: two samples were only late."""
 
 
 class ImuSamples:
@@ -110,9 +110,10 @@ class ImuSamples:
         delay_s = arrived_s - time_s - lost * PERIOD_S
         waited = arrived_s > next_pose_s + PERIOD_S  # sample and pose were read late
         if self._floor_s and self._guessed and delay_s < -EARLY_S:
-            lost -= self._guessed
-            delay_s += self._guessed * PERIOD_S
-            self._guessed = 0
+            less = min(self._guessed, math.ceil((-EARLY_S - delay_s) / PERIOD_S))
+            lost -= less
+            delay_s += less * PERIOD_S
+            self._guessed -= less
         elif delay_s < EARLY_S:
             self._guessed = 0
         if delay_s < -PERIOD_S / 2:

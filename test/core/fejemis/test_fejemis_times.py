@@ -208,6 +208,24 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
     assert max(map(abs, errors[:201] + errors[202:])) < 1e-3
 
 
+def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
+    """Samples are up to 30 ms late, and 10 % of the samples and poses are lost.
+
+    Many samples are lost before one is on time again. If this one is early, only the last loss was
+    a mistake. Otherwise the stamps would be several periods too old.
+    """
+    imu, chance = ImuSamples("m/s^2"), random.Random(2)
+    arrived_s, pose_s, errors = 0.0, -math.inf, []
+    for number in range(8000):
+        true_s = 0.01 * number
+        arrived_s = max(arrived_s, true_s + 3e-4 + 0.03 * chance.random() ** 4)
+        if number % 2 == 0 and chance.random() >= 0.1:
+            pose_s = true_s
+        if chance.random() >= 0.1:
+            errors.append(imu.sampled_s(arrived_s, pose_s, math.inf, 0) - true_s)
+    assert min(errors[400:]) > -0.025
+
+
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
     """The driver makes sure that each stamp is later than the previous stamp of the same kind.
 
