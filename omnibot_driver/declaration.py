@@ -70,6 +70,8 @@ def set_all(node: Node, request: Any, response: Any) -> Any:
 
 
 def _set(node: Node, messages: Sequence[Any]) -> SetParametersResult:
+    if not messages:  # rclpy would refuse this, and blame ``_typed``
+        return SetParametersResult(successful=True)
     for message in messages:
         if message.value.type not in KNOWN_TYPES:
             reason = f"the value of parameter '{message.name}' has no type that ROS knows"

@@ -253,6 +253,14 @@ def test_a_parameter_of_type_double_stays_a_double(start_driver: Start, probe_of
     assert value == real(1.0)
 
 
+def test_setting_no_parameters_at_once_succeeds(start_driver: Start, probe_of: Start) -> None:
+    """A client sets an empty list of parameters. Nothing is wrong, and nothing changes."""
+    probe: Probe = probe_of(start_driver("sim://"))
+    probe.wait_for_state("nominal")
+    result = probe.call(SetParametersAtomically, "set_parameters_atomically", parameters=[]).result
+    assert (result.successful, result.reason) == (True, "")
+
+
 def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
     start_driver: Start, probe_of: Start
 ) -> None:
