@@ -148,9 +148,11 @@ class Sequence:
 
         In the result, ``lost`` is the number of missing deltas. The pose contains their motion.
         """
+        if self._reconnected:
+            return Step(0)  # the next delta counts the losses from before and after this pose
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
-        if before is None or self._delta is None or self._reconnected:
+        if before is None or self._delta is None:
             return Step(0)
         passed = (count - before) % WRAP * self._per_pose
         self._regular = self._regular or 0 < passed == counted

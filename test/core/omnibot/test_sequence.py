@@ -282,6 +282,26 @@ def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> No
     assert sequence.pose(3, 205 * 0.04 + 60.0).lost == 0
 
 
+def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_earlier_losses() -> (
+    None
+):
+    """The port is closed for 1 s and opens in the middle of a delta, so a pose is complete first.
+
+    The next delta shows the losses from before and after this pose. The following pose is lost. The
+    pose after it fits the deltas, so it does not show a restart.
+    """
+    sequence, restarts = Sequence(), []
+    for count in [*range(25), *range(49, 75)]:
+        now = count * 0.04
+        if count == 49:
+            sequence.reconnect()
+        else:
+            restarts.append(sequence.delta(count, now).restarted)
+        if count % 5 == 4 and count != 54:
+            restarts.append(sequence.pose(count // 5, now).restarted)
+    assert not any(restarts)
+
+
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
     """The board sends a pose after every second delta, not after every fifth.
 
