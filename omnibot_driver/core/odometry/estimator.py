@@ -287,6 +287,7 @@ class Odometry:
         self._begin_at(self._before_waiting(told))
         estimates = self._release()
         self._belief.believe(told)
+        self._bridge.prove()
         self._track.uncertainty.give_up()
         return estimates
 
@@ -308,6 +309,7 @@ class Odometry:
         estimates = self._release()
         self._track.uncertainty.settle()
         self._belief.believe(told)
+        self._bridge.prove()
         return estimates
 
     def _assume(self) -> None:
@@ -356,8 +358,11 @@ class Odometry:
             self._belief.doubted = told
             return
         if reachable:
-            self._track.correct(log_of(way))
+            tangent = log_of(way)
+            self._track.correct(tangent)
+            self._bridge.prove(tangent)
         else:
+            self._bridge.prove()
             self.alignments += 1
             self._track.uncertainty.give_up()
         self._board = told
@@ -382,6 +387,7 @@ class Odometry:
     def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
         last_stamp_s, self._last_stamp_s = self._last_stamp_s, stamp_s
         heading_rad = None if self._board is None else self._board.yaw_rad
+        missing = self._bridge.missing
         bridge, tangent = self._bridge.tangents(reading, heading_rad)
         seconds = reading.duration_s
         if seconds is None:
@@ -390,7 +396,7 @@ class Odometry:
                 self._track.miss(UNKNOWN_S)
                 seconds = max(0.0, stamp_s - last_stamp_s)
         elif reading.lost:
-            self._track.miss((reading.lost + 1) * seconds)
+            self._track.miss((missing + reading.lost + 1) * seconds)
         if reading.lost:
             stamped_s = math.inf if last_stamp_s is None else stamp_s - last_stamp_s - seconds
             self._cross(bridge, reading.lost * seconds, stamped_s)
@@ -425,9 +431,11 @@ class Odometry:
         """
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
-            self._track.miss((lost + 1) * period_s)
-            most = min(lost, round(LONGEST_BRIDGE_S / period_s))
+            missing = self._bridge.missing
+            self._track.miss((missing + lost + 1) * period_s)
+            most = min(lost, max(0, round(LONGEST_BRIDGE_S / period_s) - missing))
             self._cross(tangent.times(most, most, most), lost * period_s)
+            self._bridge.missing += lost
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Add a motion (``tangent``, twist x time) in the board's body axes.

@@ -23,10 +23,15 @@ class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
+    * ``missing``: number of lost displacements since the last displacement or accepted pose. A pose
+      has shown that they were lost, and they were assumed to be equal to ``last``.
     """
 
     def __init__(self) -> None:
         self.last: tuple[Pose, float] | None = None
+        self.missing = 0
+        self._only_poses = False
+        """Whether no displacement has arrived since the last accepted pose."""
 
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
@@ -38,6 +43,7 @@ class GapInterpolation:
         arrived. If it is None, ``reading`` is assumed to be in body axes.
         """
         last, self.last = self.last, None
+        self.missing, self._only_poses = 0, False
         if reading.duration_s is None:
             return NO_WAY, _tangent(reading, heading_rad)
         half = min(reading.lost, round(LONGEST_BRIDGE_S / reading.duration_s)) / 2
@@ -50,6 +56,17 @@ class GapInterpolation:
             return NO_WAY, tangent
         before = last[0] if last else tangent
         return (before + tangent).times(half, half, half), tangent
+
+    def prove(self, way: Pose = NO_WAY) -> None:
+        """Record that a pose was accepted. If only poses arrive, their mean motion is ``last``.
+
+        ``way``: deviation of the pose from the assumed motion, as a tangent in body axes.
+        """
+        if self._only_poses and self.missing and self.last is not None:
+            tangent, period_s = self.last
+            part = 1 / self.missing
+            self.last = tangent + way.times(part, part, part), period_s
+        self.missing, self._only_poses = 0, True
 
 
 def _tangent(reading: DisplacementReading, heading_rad: float | None) -> Pose:

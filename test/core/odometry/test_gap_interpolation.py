@@ -2,10 +2,14 @@
 
 """Tests of gap interpolation: the displacements before and after a gap show the motion in it."""
 
+import math
+from dataclasses import replace
+
 import pytest
-from synthetic_board import PERIOD_S, Trip, body, xyyaw
+from synthetic_board import PERIOD_S, SETTINGS, Trip, attach, body, close, last, xyyaw
 
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
 from omnibot_driver.core.readings import DisplacementReading
 
@@ -69,3 +73,70 @@ def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
     assert bridge.last is None
     lost, _ = bridge.tangents(after(3, 0.01), None)
     assert xyyaw(lost) == pytest.approx((0.03, 0.0, 0.0))
+
+
+def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
+    """Ten displacements are lost; the two poses in this time show a speed of 1 m/s, not 0.5 m/s.
+
+    The next lost displacement is assumed to be as long as those before the second pose.
+    """
+    bridge = GapInterpolation()
+    bridge.tangents(body(0.02, 0.0), None)
+    bridge.prove()
+    for deviation_m in (5 * 0.02, 0.0):
+        bridge.missing += 5
+        bridge.prove(Pose(deviation_m))
+        assert bridge.last is not None
+        assert xyyaw(bridge.last[0]) == pytest.approx((0.04, 0.0, 0.0))
+
+
+def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
+    """A displacement has arrived since the last pose: it shows the present motion better."""
+    bridge = GapInterpolation()
+    bridge.tangents(body(0.02, 0.0), None)
+    bridge.missing += 1
+    bridge.prove(Pose(0.01))
+    assert bridge.last == (Pose(0.02), PERIOD_S)
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("poses", range(3, 9))
+def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it(
+    frame: str, poses: int
+) -> None:
+    """The robot turns at 2 rad/s. Then only poses arrive, and they show that the robot stands.
+
+    After them, one more displacement is lost before the first that arrives. The odometry does not
+    assume that the robot turned as before.
+    """
+    odometry, trip = Odometry(SETTINGS), Trip()
+    attach(odometry, trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.0, 0.0, 0.08, frame), 0.0)
+    odometry.settle(trip.pose)
+    for _ in range(poses):
+        odometry.settle(replace(trip.pose, lost=5))
+    still = replace(trip.move(0.0, 0.0, 0.0, frame), lost=1)
+    for _ in range(5):
+        estimates = odometry.displace(still, 0.0)
+    assert odometry.refused_poses == 0
+    assert last(estimates) == close(trip.truth, 1e-6)
+
+
+def test_the_uncertainty_of_a_gap_does_not_depend_on_the_poses_in_it_if_they_are_not_used() -> None:
+    """Fifty displacements are lost. The poses in this gap only show their number.
+
+    ``use_board_pose`` is False, so no pose shows the lost motion. The standard deviation is at
+    least that of the whole gap, not that of many short gaps.
+    """
+    deviations = []
+    for poses in (0, 9):
+        odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
+        attach(odometry, trip.pose)
+        odometry.displace(trip.move(0.0, 0.0, 0.02), 0.0)
+        for _ in range(poses):
+            odometry.settle(replace(trip.pose, lost=5))
+        reading = replace(trip.move(0.0, 0.0, 0.02), lost=50 - 5 * poses)
+        estimates = odometry.displace(reading, 51 * PERIOD_S)
+        deviations.append(math.sqrt(estimates[-1].covariance.yaw_yaw))
+    assert deviations[1] >= deviations[0]
