@@ -168,6 +168,13 @@ class Uncertainty:
             min(self.noise.unheard_radps2 * square, fastest_radps * duration_s) ** 2,
         )
 
+    def halt(self, way_m: float, turn_rad: float) -> None:
+        """Add the uncertainty of a robot that came to rest unseen, for which no pose can make up.
+
+        ``way_m``, ``turn_rad``: mean distance and angle in which it came to rest.
+        """
+        self._walk += Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
+
     def settle(self) -> None:
         """Remove the uncertainty of all gaps, because the motion in them is known now."""
         self.gap = NOTHING

@@ -387,13 +387,16 @@ class Odometry:
     def _integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
         last_stamp_s, self._last_stamp_s = self._last_stamp_s, stamp_s
         heading_rad = None if self._board is None else self._board.yaw_rad
-        missing = self._bridge.missing
+        missing, last = self._bridge.missing, self._bridge.last
         bridge, tangent = self._bridge.tangents(reading, heading_rad)
         seconds = reading.duration_s
         if seconds is None:
             seconds = 0.0
             if last_stamp_s is not None:  # otherwise the odometry begins here, without a gap
                 self._track.miss(UNKNOWN_S)
+                if reading.restarted and last is not None:
+                    halt = UNKNOWN_S / 2 / last[1]
+                    self._track.halt(last[0].times(halt, halt, halt))
                 seconds = max(0.0, stamp_s - last_stamp_s)
         elif reading.lost:
             self._track.miss((missing + reading.lost + 1) * seconds)

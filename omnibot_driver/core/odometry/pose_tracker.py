@@ -85,6 +85,11 @@ class PoseTracker:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports."""
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
+    def halt(self, tangent: Pose) -> None:
+        """Add the uncertainty of a robot that came to rest unseen, on about this tangent."""
+        way = _times(tangent, self._size)
+        self.uncertainty.halt(way.way_m, way.yaw_rad)
+
     def resume(self, tangent: Pose) -> None:
         """Add the motion during a gap. A pose of the board has shown this motion.
 

@@ -11,7 +11,7 @@ from synthetic_board import PERIOD_S, SETTINGS, Trip, attach, body, close, last,
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.odometry.gap_interpolation import GapInterpolation
-from omnibot_driver.core.readings import DisplacementReading
+from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
@@ -140,3 +140,25 @@ def test_the_uncertainty_of_a_gap_does_not_depend_on_the_poses_in_it_if_they_are
         estimates = odometry.displace(reading, 51 * PERIOD_S)
         deviations.append(math.sqrt(estimates[-1].covariance.yaw_yaw))
     assert deviations[1] >= deviations[0]
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("turn", [0.0, 0.04, -0.08])
+def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
+    frame: str, turn: float
+) -> None:
+    """The robot drives at 0.5 m/s when the board restarts, and comes to rest within 0.5 s, unseen.
+
+    If it slows down evenly, its error is at most the standard deviation, in x and in yaw.
+    """
+    odometry, trip = Odometry(SETTINGS), Trip()
+    attach(odometry, trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.02, 0.0, turn, frame), 1.0)
+    estimates = odometry.displace(
+        DisplacementReading(0.0, 0.0, 0.0, frame, None, 0, restarted=True), 4.0
+    )
+    estimates += odometry.settle(PoseReading(0.0, 0.0, 0.0))
+    covariance = estimates[-1].covariance
+    assert math.sqrt(covariance.xx) > 0.5 * 0.5 / 2
+    assert math.sqrt(covariance.yaw_yaw) > abs(turn) / PERIOD_S * 0.5 / 2
