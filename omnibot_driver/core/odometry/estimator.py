@@ -9,14 +9,18 @@ motion. This module knows SE(2); it does not know bytes, clocks or ROS.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import NOTHING, Covariance, OdometryNoise
 from omnibot_driver.core.odometry.gap_interpolation import LONGEST_BRIDGE_S, GapInterpolation
-from omnibot_driver.core.odometry.pending_displacements import PendingDisplacements, advanced
+from omnibot_driver.core.odometry.pending_displacements import (
+    PendingDisplacements,
+    advanced,
+    chord,
+)
 from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 from omnibot_driver.core.odometry.pose_tracker import PoseTracker
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
@@ -104,6 +108,9 @@ class Odometry:
         self._belief = PoseGate()
         self._restarted: Pose | None = None
         self._backlog = PendingDisplacements()
+        self._told_lost = 0
+        """Number of lost displacements that an unconfirmed pose has shown, and that no displacement
+        in ``_backlog`` counts yet."""
         self._bridge = GapInterpolation()
         self._last_stamp_s: float | None = None
         self.reset()
@@ -177,6 +184,9 @@ class Odometry:
         lost_s = reading.lost * (reading.duration_s or 0.0)
         if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
             return [*estimates, self._integrate(reading, stamp_s)]
+        if reading.duration_s is not None:
+            reading = replace(reading, lost=reading.lost + self._told_lost)
+        self._told_lost = 0
         self._backlog.add(reading, stamp_s)
         waited_s = self._backlog.duration_s
         if means_nothing:
@@ -195,8 +205,12 @@ class Odometry:
         confirmed = self._belief.confirmed(told, self._track.uncertainty.gap)
         restarted = reading.restarted and not self._continues(told)
         if restarted or self._is_new_frame(told, confirmed):
-            return self._attach(told)
+            return self._attach(told, reading.lost)
         if self._board is None or self._restarted is not None:
+            if self._backlog:
+                self._told_lost += reading.lost
+            else:
+                self._bridge_until_pose(reading.lost)
             self._belief.doubted = told
             return []
         lost_s = reading.lost * self._bridge.last[1] if self._bridge.last else 0.0
@@ -282,10 +296,19 @@ class Odometry:
             self._restarted = None
         return confirmed and self._restarted is not None
 
-    def _attach(self, told: Pose) -> list[OdometryEstimate]:
-        """Adopt a new frame of the board. The odometry continues from its current pose."""
-        self._begin_at(self._before_waiting(told))
+    def _attach(self, told: Pose, lost: int) -> list[OdometryEstimate]:
+        """Adopt a new frame of the board. The odometry continues from its current pose.
+
+        ``lost``: number of displacements lost just before the pose ``told``.
+        """
+        lost += self._told_lost
+        end, readings = told, self._backlog.readings
+        if readings and readings[-1].frame == "earth":
+            end = told - chord(readings[-1]).times(lost, lost, lost)
+        self._begin_at(self._before_waiting(end))
         estimates = self._release()
+        self._bridge_until_pose(lost)
+        self._board, self._told_lost = told, 0
         self._belief.believe(told)
         self._bridge.prove()
         self._track.uncertainty.give_up()

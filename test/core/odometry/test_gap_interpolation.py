@@ -162,3 +162,24 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
     covariance = estimates[-1].covariance
     assert math.sqrt(covariance.xx) > 0.5 * 0.5 / 2
     assert math.sqrt(covariance.yaw_yaw) > abs(turn) / PERIOD_S * 0.5 / 2
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("missing", [4, 9])
+def test_a_loss_that_a_pose_shows_before_the_frame_is_known_is_bridged(
+    frame: str, missing: int
+) -> None:
+    """The robot drives evenly. The displacement just before the first or second pose is lost.
+
+    Only the pose shows the loss. The board's frame is not known before the second pose, but the
+    odometry still assumes the lost motion.
+    """
+    odometry, trip = Odometry(SETTINGS), Trip(0.3)
+    estimates = []
+    for count in range(30):
+        reading = trip.move(0.02, 0.0, 0.02, frame)
+        if count != missing:
+            estimates += odometry.displace(reading, count * PERIOD_S)
+        if count % 5 == 4:
+            estimates += odometry.settle(replace(trip.pose, lost=int(count == missing)))
+    assert last(estimates) == close(trip.truth, 1e-3)
