@@ -116,6 +116,7 @@ class Uncertainty:
     def __init__(self, noise: OdometryNoise) -> None:
         self.noise = noise
         self.gap = NOTHING
+        self._halt = NOTHING
         self._walk = Covariance()
         self._levers: list[tuple[float, float, float]] = []
         """For each wheel: the error of the pose (m, m, rad) if the relative error of the wheel's
@@ -154,6 +155,8 @@ class Uncertainty:
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
         if self.gap is not NOTHING:
             self.gap = self.gap.carried(dx_m, dy_m)
+        if self._halt is not NOTHING:
+            self._halt = self._halt.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
@@ -169,19 +172,24 @@ class Uncertainty:
         )
 
     def halt(self, way_m: float, turn_rad: float) -> None:
-        """Add the uncertainty of a robot that came to rest unseen, for which no pose can make up.
+        """Add the uncertainty of a robot that came to rest unseen, because its board restarted.
+
+        It ends with the uncertainty of the gaps: a pose that continues the old frame shows that the
+        board has not restarted, and shows the motion. Unlike ``gap``, it does not increase the
+        tolerance for poses.
 
         ``way_m``, ``turn_rad``: mean distance and angle in which it came to rest.
         """
-        self._walk += Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
+        self._halt += Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
 
     def settle(self) -> None:
         """Remove the uncertainty of all gaps, because the motion in them is known now."""
-        self.gap = NOTHING
+        self.gap = self._halt = NOTHING
 
     def give_up(self) -> None:
         """Make the uncertainty of all gaps permanent, because the motion in them stays unknown."""
-        self._walk, self.gap = self._walk + self.gap, NOTHING
+        self._walk += self.gap + self._halt
+        self.gap = self._halt = NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
         """Return the covariance of a pose.
@@ -194,6 +202,8 @@ class Uncertainty:
         alike = map(sum, zip(*levers, strict=True)) if levers else (0.0, 0.0, 0.0)
         wrong = open_error.x_m, open_error.y_m, open_error.yaw_rad
         known = self._walk if self.gap is NOTHING else self._walk + self.gap
+        if self._halt is not NOTHING:
+            known += self._halt
         return known.with_errors(
             (*((scale, *lever) for lever in levers), (slip, *alike), (1.0, *wrong))
         )

@@ -165,6 +165,29 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
 
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(frame: str) -> None:
+    """The counter suggests a restart, but the next pose continues the old frame.
+
+    So the robot did not come to rest unseen, and the pose shows all of its motion.
+    """
+    deviations = []
+    for suspected in (False, True):
+        odometry, trip = Odometry(SETTINGS), Trip()
+        attach(odometry, trip.pose)
+        for _ in range(10):
+            odometry.displace(trip.move(0.02, 0.0, 0.04, frame), 1.0)
+        odometry.settle(trip.pose)
+        reading = trip.move(0.02, 0.0, 0.04, frame)
+        if suspected:
+            reading = replace(reading, duration_s=None, restarted=True)
+        odometry.displace(reading, 1.0)
+        odometry.settle(trip.pose)
+        covariance = odometry.displace(trip.move(0.02, 0.0, 0.04, frame), 1.0)[-1].covariance
+        deviations.append((math.sqrt(covariance.xx), math.sqrt(covariance.yaw_yaw)))
+    assert deviations[1] == pytest.approx(deviations[0], rel=0.01)
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
 @pytest.mark.parametrize("missing", [4, 9])
 def test_a_loss_that_a_pose_shows_before_the_frame_is_known_is_bridged(
     frame: str, missing: int
