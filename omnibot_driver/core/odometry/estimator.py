@@ -158,7 +158,7 @@ class Odometry:
             due = self._release()
             if self._track.uncertainty.gap != NOTHING and self._belief.proved is not None:
                 self._board = self._belief.proved = None
-        self._backlog = PendingDisplacements()
+        self._backlog, self._told_lost = PendingDisplacements(), 0
         self._track.begin()
         self._reset_s = now
         return due
@@ -174,7 +174,7 @@ class Odometry:
             return []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
-            self._backlog = PendingDisplacements()
+            self._backlog, self._told_lost = PendingDisplacements(), 0
             self._restarted, self._belief.doubted = Pose(), None
         if self._restarted is not None:
             self._restarted = advanced(self._restarted, reading)
@@ -213,12 +213,13 @@ class Odometry:
                 self._bridge_until_pose(reading.lost)
             self._belief.doubted = told
             return []
-        lost_s = reading.lost * self._bridge.last[1] if self._bridge.last else 0.0
+        lost, self._told_lost = reading.lost + self._told_lost, 0
+        lost_s = lost * self._bridge.last[1] if self._bridge.last else 0.0
         is_long = bool(self._backlog) or lost_s > LONG_GAP_S
         if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
             return self._resume(told, lost_s)
         estimates = self._release()
-        self._bridge_until_pose(reading.lost)
+        self._bridge_until_pose(lost)
         if self._settings.use_board_pose:
             self._judge(told, confirmed)
         return estimates

@@ -164,6 +164,43 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
     assert math.sqrt(covariance.yaw_yaw) > abs(turn) / PERIOD_S * 0.5 / 2
 
 
+def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> None:
+    """The first pose shows that five displacements are lost. Then the odometry is reset."""
+    odometry, trip = Odometry(SETTINGS), Trip()
+    for _ in range(4):
+        odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
+    for _ in range(5):
+        trip.move(0.02, 0.0, 0.0)
+    odometry.settle(replace(trip.pose, lost=5))
+    odometry.reset(0.0)
+    for _ in range(5):
+        odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
+    assert last(odometry.settle(trip.pose)) == close((5 * 0.02, 0.0, 0.0))
+
+
+def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> None:
+    """Two displacements are lost after a suspected restart. Two poses disprove the restart.
+
+    ``use_board_pose`` is False, so the lost motion is assumed, but not later than at the next
+    displacement.
+    """
+    odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
+    attach(odometry, trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
+    reading = replace(trip.move(0.02, 0.0, 0.0), duration_s=None, restarted=True)
+    odometry.displace(reading, 0.0)
+    odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
+    for _ in range(2):
+        trip.move(0.02, 0.0, 0.0)
+    assert odometry.settle(replace(trip.pose, lost=2)) == []
+    odometry.settle(trip.pose)
+    estimates = []
+    for _ in range(10):
+        estimates += odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
+    assert last(estimates) == close(trip.truth)
+
+
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(frame: str) -> None:
     """The counter suggests a restart, but the next pose continues the old frame.
