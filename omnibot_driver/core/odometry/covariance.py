@@ -158,17 +158,20 @@ class Uncertainty:
         if self._halt is not NOTHING:
             self._halt = self._halt.carried(dx_m, dy_m)
 
-    def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
+    def miss(
+        self, duration_s: float, fastest_mps: float, fastest_radps: float, counted_s: float = 0.0
+    ) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
         The uncertainty is the possible deviation from a motion at constant speed. Within the time
         t, the robot may accelerate with the acceleration a and then brake. It then deviates by at
         most a·t²/4. The deviation is also limited by the fastest speeds.
+
+        ``counted_s``: duration of the first part of this gap, if its uncertainty was added before.
         """
-        square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(
-            min(self.noise.unheard_mps2 * square, fastest_mps * duration_s) ** 2,
-            min(self.noise.unheard_radps2 * square, fastest_radps * duration_s) ** 2,
+            _unheard_variance(self.noise.unheard_mps2, fastest_mps, duration_s, counted_s),
+            _unheard_variance(self.noise.unheard_radps2, fastest_radps, duration_s, counted_s),
         )
 
     def halt(self, way_m: float, turn_rad: float) -> None:
@@ -207,6 +210,15 @@ class Uncertainty:
         return known.with_errors(
             (*((scale, *lever) for lever in levers), (slip, *alike), (1.0, *wrong))
         )
+
+
+def _unheard_variance(acceleration: float, fastest: float, until_s: float, from_s: float) -> float:
+    """Return by how much the variance of a gap increases while it grows to ``until_s``."""
+    before, after = (
+        min(acceleration * duration_s * duration_s / 4, fastest * duration_s) ** 2
+        for duration_s in (from_s, until_s)
+    )
+    return max(0.0, after - before)
 
 
 @cache

@@ -423,7 +423,8 @@ class Odometry:
                     self._track.halt(last[0].times(halt, halt, halt))
                 seconds = max(0.0, stamp_s - last_stamp_s)
         elif reading.lost:
-            self._track.miss((missing + reading.lost + 1) * seconds)
+            counted = missing + 1 if missing else 0
+            self._track.miss((missing + reading.lost + 1) * seconds, counted * seconds)
         if reading.lost:
             stamped_s = math.inf if last_stamp_s is None else stamp_s - last_stamp_s - seconds
             self._cross(bridge, reading.lost * seconds, stamped_s)
@@ -459,7 +460,8 @@ class Odometry:
         if lost and self._bridge.last is not None:
             tangent, period_s = self._bridge.last
             missing = self._bridge.missing
-            self._track.miss((missing + lost + 1) * period_s)
+            counted = missing + 1 if missing else 0
+            self._track.miss((missing + lost + 1) * period_s, counted * period_s)
             most = min(lost, max(0, round(LONGEST_BRIDGE_S / period_s) - missing))
             self._cross(tangent.times(most, most, most), lost * period_s)
             self._bridge.missing += lost

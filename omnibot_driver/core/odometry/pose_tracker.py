@@ -81,9 +81,12 @@ class PoseTracker:
         move = follower.move if stamped_s >= seconds else follower.trail
         move(chord, self._fastest_mps * stamped_s, self._fastest_radps * stamped_s)
 
-    def miss(self, duration_s: float) -> None:
-        """Add the uncertainty of a gap of ``duration_s`` in the board's reports."""
-        self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
+    def miss(self, duration_s: float, counted_s: float = 0.0) -> None:
+        """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
+
+        ``counted_s``: duration of the first part of this gap, if its uncertainty was added before.
+        """
+        self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps, counted_s)
 
     def halt(self, tangent: Pose) -> None:
         """Add the uncertainty of a robot that came to rest unseen, on about this tangent."""
