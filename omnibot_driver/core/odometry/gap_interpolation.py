@@ -23,6 +23,7 @@ class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
+      If only poses arrive, it is the mean motion per displacement between the accepted poses.
     * ``missing``: number of lost displacements since the last displacement or accepted pose. A pose
       has shown that they were lost, and they were assumed to be equal to ``last``.
     """
