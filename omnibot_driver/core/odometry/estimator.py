@@ -167,11 +167,12 @@ class Odometry:
         """Add a displacement; return its estimates, or none while it waits for a pose."""
         estimates = []
         reset_s, self._reset_s = self._reset_s, None
-        gap_s = self._gap_s(reading, stamp_s)
-        if reset_s is not None and gap_s and stamp_s - reset_s < gap_s / 2:
-            self.displace(reading, stamp_s)
-            self.reset(stamp_s)
-            return []
+        if reset_s is not None:
+            gap_s = self._gap_s(reading, stamp_s)
+            if gap_s and stamp_s - reset_s < gap_s / 2:
+                self.displace(reading, stamp_s)
+                self.reset(stamp_s)
+                return []
         if reading.restarted:
             estimates = self._release() if self._board is not None else []
             self._backlog, self._told_lost = PendingDisplacements(), 0
@@ -219,7 +220,8 @@ class Odometry:
         if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
             return self._resume(told, lost_s)
         estimates = self._release()
-        self._bridge_until_pose(lost)
+        if lost:
+            self._bridge_until_pose(lost)
         if self._settings.use_board_pose:
             self._judge(told, confirmed)
         return estimates
