@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a simulated board in the driver's own process, as a transport."""
+"""Tests of the transport to a simulated board that runs in the driver's own process."""
 
 import threading
 import time

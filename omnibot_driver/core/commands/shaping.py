@@ -59,7 +59,7 @@ class CommandShaper:
 
     @property
     def takes_velocities(self) -> bool:
-        """Whether the board accepts velocities. The switch on the board can forbid them."""
+        """Whether the board accepts velocities. It does not if position control is selected."""
         return self._control != "position"
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:

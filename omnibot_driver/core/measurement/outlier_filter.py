@@ -60,12 +60,13 @@ the displacement before the spike by at most this fraction of the spike's size."
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
-    """Limits that the robot cannot exceed, even when it is pushed by hand.
+    """Limits by which the outlier filter recognises implausible readings.
 
-    * ``force_step_mps2``: limit in m/s². A smaller change of an acceleration between two readings
-      is never a spike.
-    * ``full_scale_mps2``: full scale of the accelerometer, in m/s²; infinite if its readings are
-      not integers.
+    * ``fastest_…``: the robot cannot exceed them, even when it is pushed by hand.
+    * ``force_step_mps2``: in m/s². A smaller change between two accelerometer readings is never a
+      spike.
+    * ``full_scale_mps2``: full scale of the accelerometer, in m/s². It is infinite if the readings
+      are not integers: the filter then does not look for flipped bits.
     """
 
     fastest_mps: float = 2.0

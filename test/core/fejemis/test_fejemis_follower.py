@@ -44,9 +44,9 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """A wheel that gets a new angle while it turns has the full time for the new angle.
+    """The front wheel turns to one side. On the way, it gets an angle on the other side.
 
-    Until then, no fault is reported.
+    It turns back at once and comes nearer to the new angle, so no fault is reported.
     """
     follower = Follower()
     follower.aim(1.5)

@@ -51,7 +51,10 @@ def test_a_restart_is_not_taken_for_wheels_that_roll_back(seconds: float) -> Non
 
 
 def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: float) -> None:
-    """Drive for ``seconds``. The board's clock wraps ``wrapped_for_s`` before the drive ends."""
+    """Drive for ``seconds``. The drive ends ``wrapped_for_s`` s after the board's clock wraps.
+
+    If ``wrapped_for_s`` is negative, the drive ends before the clock wraps.
+    """
     since_s = (bench.board.now_s + seconds) % CLOCK_WRAPS_S
     bench.run((wrapped_for_s - since_s) % CLOCK_WRAPS_S)
     bench.drive_on(speed_mps, seconds)

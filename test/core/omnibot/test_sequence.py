@@ -285,10 +285,10 @@ def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> No
 def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_earlier_losses() -> (
     None
 ):
-    """The port is closed for 1 s and opens in the middle of a delta, so a pose is complete first.
+    """The port is closed for 1 s. It opens in the middle of a delta, so a pose arrives first.
 
-    The next delta shows the losses from before and after this pose. The following pose is lost. The
-    pose after it fits the deltas, so it does not show a restart.
+    The counter of this pose is ignored. The next delta shows how many deltas were lost. The second
+    pose is lost. The counter of the third pose agrees with the deltas, so no restart is assumed.
     """
     sequence, restarts = Sequence(), []
     for count in [*range(25), *range(49, 75)]:
