@@ -220,18 +220,24 @@ def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_th
     assert sequence.delta(1, 9.88, imus=4) == Step(0)
 
 
-def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
-    """The port is closed and opened again, and the board has restarted in the meantime.
-
-    By chance, its count 0 fits the last count and the elapsed time. The counter of the next pose
-    shows the restart, as it does while the port stays open.
-    """
+def reopened() -> Sequence:
+    """Return the state after the deltas 0 to 205, their poses, and a reconnection."""
     sequence = Sequence()
     for count in range(206):
         sequence.delta(count, count * 0.04)
         if count % 5 == 4:
             sequence.pose(count // 5, count * 0.04)
     sequence.reconnect()
+    return sequence
+
+
+def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
+    """The port is closed and opened again, and the board has restarted in the meantime.
+
+    By chance, its count 0 fits the last count and the elapsed time. The counter of the next pose
+    shows the restart, as it does while the port stays open.
+    """
+    sequence = reopened()
     after_s = 205 * 0.04 + 2.0
     for count in range(5):
         sequence.delta(count, after_s + count * 0.04)
@@ -273,12 +279,7 @@ def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> No
 
     The difference of the pose counters means nothing, so the pose contains no known losses.
     """
-    sequence = Sequence()
-    for count in range(206):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
-    sequence.reconnect()
+    sequence = reopened()
     assert sequence.pose(3, 205 * 0.04 + 60.0).lost == 0
 
 

@@ -73,26 +73,17 @@ class Mart:
         assert not self.do(lambda board: board.server.hung)
 
     def answer_at_rest(self, probe: Probe, service: str) -> Any:
-        """Call the service once a second until the driver knows that the robot is at rest.
+        """Call the service until the driver knows that the robot is at rest; return the answer."""
+        return self.answer(probe, service, while_refused="no proof that the robot is at rest")
+
+    def answer(self, probe: Probe, service: str, while_refused: str = "refused") -> Any:
+        """Call the service once a second, as long as its answer contains ``while_refused``.
 
         Return the last answer.
         """
         for _ in range(round(PATIENCE_S)):
             done = probe.call(Trigger, service)
-            if "no proof that the robot is at rest" not in done.message:
-                break
-            later = self.do(lambda board: board.ticks) + SECOND_TICKS
-            self.wait_for(lambda board, later=later: board.ticks > later)
-        return done
-
-    def answer(self, probe: Probe, service: str) -> Any:
-        """Call the service once a second, as long as the driver refuses it.
-
-        Return the last answer.
-        """
-        for _ in range(round(PATIENCE_S)):
-            done = probe.call(Trigger, service)
-            if "refused" not in done.message:
+            if while_refused not in done.message:
                 break
             later = self.do(lambda board: board.ticks) + SECOND_TICKS
             self.wait_for(lambda board, later=later: board.ticks > later)
