@@ -23,7 +23,7 @@ from omnibot_driver import messages, selfcheck
 from omnibot_driver.cdr import Messages, Serializer, difference
 from omnibot_driver.core.events import Event, Extra, Notice, StateChanged
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.readings import Unstamped
 from omnibot_driver.core.requests import RequestDone

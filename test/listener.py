@@ -14,7 +14,7 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.events import Event
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import packed
 from omnibot_driver.core.session import Session, SessionSettings

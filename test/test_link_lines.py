@@ -18,7 +18,7 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.packets import Packets, joined, packed
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import Link

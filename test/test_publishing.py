@@ -31,7 +31,7 @@ from omnibot_driver.core.lois_ecu.readings import RecordFailed, RecordReading, T
 from omnibot_driver.core.mart.readings import DockedReading
 from omnibot_driver.core.mart.readings import JobDone as MartDone
 from omnibot_driver.core.odometry.covariance import Covariance
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.omnibot import PausedFrame
 from omnibot_driver.core.omnibot.board import TRAITS
 from omnibot_driver.core.omnibot.frames import Frame

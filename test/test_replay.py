@@ -19,7 +19,7 @@ from omnibot_driver.core.errors import LinkError, RequestRefused
 from omnibot_driver.core.events import Event, Notice, StateChanged
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session

@@ -7,7 +7,7 @@ from listener import Listener, link_to, session
 
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.simulator.omnibot import SimulatedBoard
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")

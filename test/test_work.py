@@ -22,7 +22,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import Covariance
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.omnibot import FrameDecoder
 from omnibot_driver.core.session import Session
 from omnibot_driver.messages import MessageSettings, turned, unturned

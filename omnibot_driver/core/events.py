@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.requests import RequestDone
 
 

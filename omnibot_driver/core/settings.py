@@ -9,7 +9,7 @@ from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.geometry.kinematics import Kinematics
 from omnibot_driver.core.imu.bias_correction import ImuCorrection
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,7 @@ from omnibot_driver.core.imu.bias_correction import ImuCorrection
 from omnibot_driver.core.imu.scale import STANDARD_GRAVITY
 from omnibot_driver.core.measurement.outlier_filter import MotionLimits
 from omnibot_driver.core.odometry.covariance import OdometryNoise
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.readings import Vector3
 from omnibot_driver.core.settings import SessionSettings
 

@@ -28,7 +28,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.board import FejemisBoard
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.session import Session
 from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.link import Link

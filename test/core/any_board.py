@@ -21,7 +21,7 @@ from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.core.session import Session, SessionSettings
 

@@ -7,7 +7,8 @@ from itertools import pairwise
 from lossy_odometry import Line, loses_nothing
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import PoseReading
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from random import Random
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.omnibot import OmniBotSettings, decode
 from omnibot_driver.core.omnibot.frames import DeltaFrame, Frame, PausedFrame, PoseFrame
 from omnibot_driver.core.omnibot.translation import Translation

@@ -11,7 +11,7 @@ from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.events import Event, Notice
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import OnExit, Request, RequestDone

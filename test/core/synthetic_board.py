@@ -11,7 +11,8 @@ import math
 import pytest
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 PERIOD_S = 0.04

@@ -16,7 +16,8 @@ from lossy_drives import (
 from lossy_odometry import DELTA, POSE, TEXT, loses_nothing
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import DisplacementReading, PoseReading

@@ -7,7 +7,7 @@ from robots import standing
 from session_bench import OPENING, START, Bench
 
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, encode
 from omnibot_driver.core.omnibot.frames import Frame
 from omnibot_driver.core.requests import Request

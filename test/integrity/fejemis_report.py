@@ -22,7 +22,7 @@ from omnibot_driver.core.events import Event, Extra
 from omnibot_driver.core.fejemis import OrientedImuReading
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.session import Session
 from omnibot_driver.parameters import session_settings
 from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis

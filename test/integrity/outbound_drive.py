@@ -19,7 +19,7 @@ from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.commands.shaping import ControlMethod
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.packets import joined
 from omnibot_driver.core.requests import OnExit

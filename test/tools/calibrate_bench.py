@@ -9,7 +9,7 @@ from session_bench import TICK_S, Bench
 
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.simulator.omnibot import BoardSettings
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Topic

@@ -25,7 +25,8 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.measurement.pipeline import Estimate
 from omnibot_driver.core.motion_monitor.monitor import ADVICE, STOPPED, Fault, MotionMonitor
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.core.reporting.figures import CommandFigures

@@ -14,7 +14,8 @@ from omnibot_driver.core.geometry.se2 import Signs
 from omnibot_driver.core.imu.bias_correction import BiasCorrector, ImuEstimate
 from omnibot_driver.core.measurement.outlier_filter import OutlierFilter, Refused, Stamped
 from omnibot_driver.core.measurement.statistics import StreamStatistics
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import (
     DisplacementReading,
     EStopButtonReading,

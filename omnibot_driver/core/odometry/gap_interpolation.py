@@ -8,8 +8,12 @@ This module does not know where the robot is, nor how the result is used.
 import math
 from typing import Final
 
-from omnibot_driver.core.geometry.se2 import Pose, log_of
-from omnibot_driver.core.odometry.pending_displacements import chord
+from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
+from omnibot_driver.core.odometry.pending_displacements import (
+    PendingDisplacements,
+    advanced,
+    chord,
+)
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
@@ -57,6 +61,23 @@ class GapInterpolation:
             return NO_WAY, tangent
         before = last[0] if last else tangent
         return (before + tangent).times(half, half, half), tangent
+
+    def before(self, told: Pose, waiting: PendingDisplacements) -> Pose:
+        """Return the pose from which the waiting displacements lead exactly to ``told``.
+
+        Each displacement that was lost before or between them counts with its interpolated motion.
+        """
+        start, readings = waiting.before(told), waiting.readings
+        if not any(reading.lost for reading in readings):
+            return start
+        for _ in range(2):  # the first pass finds the heading, and the second the place
+            gaps, end = GapInterpolation(), start
+            gaps.last = self.last
+            for reading in readings:
+                lost_way, _ = gaps.tangents(reading, end.yaw_rad)
+                end = advanced(end.moved(roll(lost_way)), reading)
+            start += told - end
+        return start
 
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted. If only poses arrive, their mean motion is ``last``.

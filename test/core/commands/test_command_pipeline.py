@@ -21,7 +21,7 @@ from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import OdometryNoise
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)

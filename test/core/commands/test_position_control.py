@@ -10,7 +10,7 @@ from robots import push, reconnect
 from session_bench import EMERGENCY_STOP, STOP, Bench, bare
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 

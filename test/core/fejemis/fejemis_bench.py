@@ -19,7 +19,7 @@ from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.covariance import OdometryNoise
-from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.simulator.fejemis import FejemisSettings as SimulatedSettings

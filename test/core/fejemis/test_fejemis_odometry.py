@@ -16,7 +16,8 @@ from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
 from omnibot_driver.core.fejemis.odometry import PoseOdometry
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
-from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 

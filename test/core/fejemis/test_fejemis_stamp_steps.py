@@ -12,7 +12,7 @@ from fejemis_bench import Bench
 from omnibot_driver.core.events import Extra
 from omnibot_driver.core.fejemis.teensy_clock import StampedReadings
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.readings import ImuReading
 
 

@@ -24,7 +24,7 @@ from omnibot_driver.core.fejemis.steering import (
 )
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware

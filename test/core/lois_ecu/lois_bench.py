@@ -14,7 +14,7 @@ from omnibot_driver.core.events import Extra
 from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.lois_ecu import SimulatedLois

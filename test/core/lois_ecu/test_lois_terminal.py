@@ -19,7 +19,7 @@ from omnibot_driver.core.lois_ecu import (
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.requests import Request
 
 GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)

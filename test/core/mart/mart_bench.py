@@ -17,7 +17,7 @@ from omnibot_driver.core.mart import MartSettings as Settings
 from omnibot_driver.core.mart.board import MartBoard
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import JobDone
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.common.network import FaultyNetwork, NetworkFaults
 from omnibot_driver.simulator.mart import QUIRKS, Firmware, MartSettings, SimulatedMart

@@ -11,7 +11,7 @@ from mart_bench import MartBench
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.mart import MartSettings
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.mart import Firmware
 

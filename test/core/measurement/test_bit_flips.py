@@ -14,7 +14,7 @@ from session_bench import TICK_S, Bench
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.imu.scale import ImuScale
-from omnibot_driver.core.odometry.estimator import OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 
 IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"

@@ -13,7 +13,8 @@ from strategies import axis_signs, small_moves
 from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.geometry.se2 import Pose, roll
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.omnibot import DeltaFrame, OmniBotSettings
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import DisplacementReading, PoseReading

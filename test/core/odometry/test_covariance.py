@@ -22,7 +22,8 @@ from synthetic_board import (
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.simulator.omnibot import BoardSettings
 

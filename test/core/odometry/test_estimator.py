@@ -23,7 +23,8 @@ from synthetic_board import (
 )
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, SimulatedBoard

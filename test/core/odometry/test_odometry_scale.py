@@ -9,7 +9,7 @@ from session_bench import Bench
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.session import SessionSettings
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 

@@ -13,7 +13,8 @@ from lossy_drives import (
 )
 
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.estimator import Odometry, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 

@@ -13,7 +13,7 @@ from lossy_drives import (
 )
 from lossy_odometry import DELTA, POSE, board_pose, loses_nothing
 
-from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 

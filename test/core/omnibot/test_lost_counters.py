@@ -19,7 +19,8 @@ from lossy_drives import (
 )
 from lossy_odometry import DELTA, POSE, Line, loses_nothing
 
-from omnibot_driver.core.odometry.estimator import Odometry, OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 

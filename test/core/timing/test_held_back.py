@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from session_bench import TICK_S, Bench
 
-from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 HELD = 4095

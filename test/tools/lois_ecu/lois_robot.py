@@ -17,7 +17,7 @@ from omnibot_driver.core.events import Extra
 from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordReading
-from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.lois_ecu import (
     QUIRKS,

@@ -1,0 +1,89 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The robot's pose in the board's frame, and whether the board still uses that frame.
+
+A board that restarts begins a new frame at the robot's place. This module does not know the
+odometry frame.
+"""
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.covariance import NOTHING, Covariance
+from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
+
+
+class BoardFrame:
+    """The board's frame, as its poses have shown it.
+
+    * ``pose``: the robot's pose in this frame; None while the frame is unknown.
+    * ``since_restart``: motion since a suspected restart of the board; None if no restart is
+      suspected.
+    * ``gate``: decides which poses of the board are accepted.
+    """
+
+    def __init__(self) -> None:
+        self.pose: Pose | None = None
+        self.since_restart: Pose | None = None
+        self.gate = PoseGate()
+
+    def suspect_restart(self) -> None:
+        """Suspect that the board has restarted just now, and so has begun a new frame."""
+        self.since_restart, self.gate.doubted = Pose(), None
+
+    def begin_at(self, pose: Pose) -> None:
+        """Adopt the frame in which the robot is at ``pose`` now."""
+        self.pose, self.since_restart, self.gate.doubted = pose, None, None
+
+    def forget(self) -> None:
+        """Forget the robot's pose; the board's next poses must show it again."""
+        self.pose = self.gate.proved = None
+
+    def continues(self, told: Pose, gap: Covariance) -> bool:
+        """Return whether a pose is so near to the expected place that a restart changes nothing.
+
+        The counter of a pose seems to begin anew also if the pose before it was damaged.
+
+        A restart takes longer than a period. So the board did not restart if no displacement was
+        lost since the last accepted pose. If displacements were lost, the result is False.
+
+        ``gap``: covariance of the motion that was lost since the last accepted pose.
+        """
+        if self.pose is None or self.since_restart is not None:
+            return False
+        return gap == NOTHING and expected(self.pose.way_to(told), gap)
+
+    def was_replaced(
+        self, told: Pose, before: Pose, gap: Covariance, *, confirmed: bool, reachable: bool
+    ) -> bool:
+        """Return whether a pose shows that the board uses a new frame since a suspected restart.
+
+        ``told``: the pose that the board reports.
+
+        ``before``: the same pose, but before the displacements that wait for a pose.
+
+        ``confirmed``: whether ``told`` agrees with the last doubted pose.
+
+        ``reachable``: whether the robot can have reached ``told`` without a restart.
+
+        Two poses are expected. The *new* one assumes that the board's pose was zero at the restart.
+        The *old* one assumes that the board did not restart. A pose *fits* if it is near an
+        expected pose. The first rule that applies gives the result:
+
+        * ``told`` fits the new one, and is nearer to it than to the old one: True.
+        * ``told`` fits the old one: False, and the suspicion ends.
+        * ``told`` is confirmed and reachable: False, and the suspicion ends.
+        * In all other cases: ``confirmed``.
+        """
+        assert self.pose is not None
+        assert self.since_restart is not None
+        anew = self.since_restart.way_to(told)
+        went_on = self.pose.way_to(before)
+        if expected(anew, gap) and _size(anew) < _size(went_on):
+            return True
+        if expected(went_on, gap) or (confirmed and reachable):
+            self.since_restart = None
+            return False
+        return confirmed
+
+
+def _size(way: Pose) -> float:
+    return way.way_m + abs(way.yaw_rad)
