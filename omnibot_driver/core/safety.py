@@ -113,7 +113,7 @@ class SafetyStops:
             )
             if not latched:
                 self._measurement.inertial.calibration.give_up(
-                    "the e-stop was latched meanwhile; call again"
+                    "the e-stop was latched during the calibration; call again"
                 )
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open; the stop will be sent when it opens"

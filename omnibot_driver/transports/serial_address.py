@@ -95,7 +95,10 @@ def explain(url: str, parameter: str, error: Exception) -> str:
 
 
 def _is_gone(error: Exception) -> bool:
-    """Return whether the port is a terminal whose device was unplugged, or does not exist."""
+    """Return whether the error means that no device is behind the terminal.
+
+    Either the device was unplugged, or this terminal never had one.
+    """
     return any(
         isinstance(each, termios.error) and each.args[:1] in ((errno.EIO,), (errno.ENODEV,))
         for each in (error, error.__context__)

@@ -91,9 +91,9 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start ``steps.py``, a relay that has some of the driver's tasks.
+    """Start ``steps.py``, a relay that publishes a board's data and does some driver's tasks.
 
-    ``what``: the step that determines which tasks.
+    ``what``: a key of ``STEPS`` in ``steps.py``. It selects the tasks that the relay does.
     """
     return Program(str(HERE / "steps.py"), what, path, namespace)
 

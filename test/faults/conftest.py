@@ -18,9 +18,11 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return three durations for ``Rig``, in s. They are suitable for a busy computer.
+    """Return ``grace_s``, ``ends_within_s`` and ``rest_s`` of ``Rig`` for a busy computer, in s.
 
-    A commander sends six commands in ``rest_s``, so the rig still notices if a commander does not
-    stop. ``make faults`` uses other durations: 0.1 s, 2 s and 1 s, in the same order.
+    ``rest_s`` is shorter than the rig's default, but long enough: a commander that does not stop
+    sends six commands in this time, so the rig does not regard the robot as at rest.
+
+    ``make faults`` uses the defaults of ``Rig``.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}

@@ -52,7 +52,7 @@ def other_type(rig: Rig) -> None:
     for _ in range(30):
         publisher.publish(stamped)
         rig.wait_ticks(5)
-    rig.expect_still(since, "the other type goes on")
+    rig.expect_still(since, "TwistStamped messages on cmd_vel continue")
     rig.driver.wait_for_line("TwistStamped")
     node.destroy_node()
     context.shutdown()

@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board reports a moving robot in two cases: the driver sends motion commands, or the set-point
-that the board has received is a motion. A change of the board's state appears in its reports after
-one or two ticks.
+A running board reports a moving robot while the driver sends motion commands, even if the line
+loses them. It also does so while the last set-point that it received is a motion. A change of the
+board's state appears in its reports after one or two ticks.
 """
 
 import math

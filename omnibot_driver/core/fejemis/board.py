@@ -243,7 +243,7 @@ class FejemisBoard(Board):
         elif not self._obedience.estopped:
             self._upkeep.machine.off()
             self._obedience.latch(running=self.mode is Mode.NOMINAL)
-            why = "the e-stop was latched meanwhile; release it, then call again"
+            why = "the e-stop was latched during the request; release it, then call again"
             self._upkeep.jobs.interrupt(why)
 
     def motion(self, drive: bytes, front: bytes) -> Packets:

@@ -159,8 +159,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None if they are unknown.
 
-        The user's values are returned if the board has not reported its own values. They are also
-        returned if the board's values differ from them only by rounding.
+        The user's values are returned if the board has not reported its values, or if the board's
+        values are the user's values, but rounded.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

@@ -22,7 +22,9 @@ LARGEST: Final = 4
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all numbers that can be sent safely, in rising order, and the text of each number.
+    """Return all safe numbers in rising order, and the text of each number.
+
+    A number is safe if the checksum of its line detects the loss of any two of its characters.
 
     ``negative``: whether the numbers are for a line that contains a minus sign. They then contain
     no ``6``, because the checksum does not detect the loss of a ``-`` together with a ``6``.

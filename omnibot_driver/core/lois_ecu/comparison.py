@@ -74,9 +74,10 @@ fractions of the distance that the wheel rolls while reports are lost. First val
 speed. Second value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Error that remains in a wheel's distance after a correction of more than ``CORRECTED_TICKS`` by
-the board's odometry (0x20): standard deviation, as a fraction of the excess over
-``CORRECTED_TICKS``. The reason: the filter is linear, but the motion of a starting wheel is not."""
+"""The board's odometry (0x20) corrects a wheel's distance. If it corrects more than
+``CORRECTED_TICKS``, an error remains, because the filter is linear and the motion of a starting
+wheel is not. ``CORRECTED_PART`` times the part of the correction above ``CORRECTED_TICKS`` is the
+standard deviation of this error."""
 LATE_PART: Final = 0.6
 """Error in a wheel's distance that a late report causes: standard deviation, as a fraction of the
 distance that the wheel rolls during the delay. Only a wheel without counted ticks has this error.

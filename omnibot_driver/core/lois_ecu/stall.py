@@ -31,9 +31,9 @@ TOO_FAST_RPM: Final = 3
 limit is ``TOO_FAST_RPM`` RPM above the set-point. If the board repeats a speed that is above both
 limits, this speed is outdated, and the wheel is at rest."""
 UNLIKE: Final = 1.15
-"""Two wheels that roll backward may both be faster than their set-points, but by similar factors.
-The factor of a wheel is its speed divided by its set-point. ``UNLIKE`` is the largest assumed ratio
-between the factors of the two wheels."""
+"""The *factor* of a wheel is its speed divided by its set-point. If both wheels roll backward, both
+factors may be high, but they are similar. ``UNLIKE`` is the largest ratio between them that is
+regarded as similar."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8

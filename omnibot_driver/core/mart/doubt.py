@@ -46,11 +46,11 @@ smaller turn, the value is multiplied by the angle in rad.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Random error of a turn that is computed from the commands, as a fraction of its constant error.
+"""A turn that is computed from the commands has a constant and a random error.
 
-Both errors are standard deviations. The constant error comes from the assumed wheel speed ratio, so
-it has the same sign in all intervals between two encoder counts. The random errors of different
-intervals are independent.
+The constant error comes from the assumed wheel speed ratio. It has the same sign in all intervals
+between two encoder counts. The random error is independent in each interval. This value is the
+random error divided by the constant error, both as standard deviations.
 """
 ASTRAY: Final = 0.7
 """Factor for a position error that an uncertain heading causes.

@@ -58,7 +58,10 @@ class IncomingFile:
 
     @property
     def fault(self) -> str:
-        """What the lengths of the pieces show to be wrong; empty if nothing."""
+        """Message that pieces are lost, doubled or in the wrong order, judged by their lengths.
+
+        It is empty if the lengths show no fault.
+        """
         if self.came < self.size:
             lost = math.ceil((self.size - self.came) / PIECE)
             return f"{lost} pieces of {self.name} were lost"

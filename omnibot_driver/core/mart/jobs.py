@@ -201,7 +201,7 @@ class Jobs:
             self._file = IncomingFile(*reply.file)
             self._piece_s = now + QUIET_S
         elif job is Job.LOG_FILE:
-            self._finish(False, f"the server has ended without sending a file; {COPY}")
+            self._finish(False, f"the controller sent no file; {COPY}")
         else:
             if job is Job.LOG:
                 self.logging, self.log_may_be_lost = True, False

@@ -64,7 +64,7 @@ SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 ``GREET_AGAIN_S``: time between two HELLOs.
 """
 COMMANDED: Final = "a motion command or a stop arrived; stop sending commands, then call again"
-ESTOPPED: Final = "the e-stop was latched meanwhile; release it, then call again"
+ESTOPPED: Final = "the e-stop was latched during the request; release it, then call again"
 COPY_S: Final = 0.25
 """Time in s after a controlled move within which the server must answer a query (ENC or HELLO).
 

@@ -46,7 +46,8 @@ SLOW_STOP: Final = (
     " down a slope, or the server has left a motor on; the driver continues"
 )
 NO_START_S: Final = 0.75
-"""Duration in s of a controlled turn (MCR, MCL) above which a wheel has certainly turned.
+"""Time in s from the start of a controlled turn (MCR, MCL) to the server's reply. If the reply
+comes later, a wheel has certainly turned.
 
 If no wheel turns, the server gives up 0.6 s after the start. If a wheel turns, the server replies
 later: before its reply, it waits 0.75 s for the robot to stop.

@@ -353,7 +353,7 @@ class Stops(Ground, ABC):
             self._notice(self._obstacle(reply, motion), halt=True)
 
     def _block(self, motion: Motion, why: str) -> None:
-        """Refuse the direction of ``motion`` until the command ends or is zero."""
+        """Refuse the direction of ``motion`` until the user's command ends or is zero."""
         if self._blocked is not motion:
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"

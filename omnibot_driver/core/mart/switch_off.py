@@ -58,7 +58,7 @@ class SwitchOff:
         self.needed = not self._refused
 
     def begins(self, *, straight: bool) -> None:
-        """Record that a motion begins, which overwrites the units of both motors.
+        """Record that a motion begins. It sets both motors anew, so an earlier need for MCS ends.
 
         ``straight``: whether it is a straight controlled move, after which a motor may stay on.
         """

@@ -167,7 +167,7 @@ class Uncertainty:
         t, the robot may accelerate with the acceleration a and then brake. It then deviates by at
         most a·t²/4. The deviation is also limited by the fastest speeds.
 
-        ``counted_s``: duration of the first part of this gap, if its uncertainty was added before.
+        ``counted_s``: duration of the first part of this gap, whose uncertainty was added earlier.
         """
         self.gap += Covariance.diagonal(
             _unheard_variance(self.noise.unheard_mps2, fastest_mps, duration_s, counted_s),

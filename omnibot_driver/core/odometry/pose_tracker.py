@@ -84,7 +84,7 @@ class PoseTracker:
     def miss(self, duration_s: float, counted_s: float = 0.0) -> None:
         """Add the uncertainty of a gap of ``duration_s`` in the board's reports.
 
-        ``counted_s``: duration of the first part of this gap, if its uncertainty was added before.
+        ``counted_s``: duration of the first part of this gap, whose uncertainty was added earlier.
         """
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps, counted_s)
 

@@ -28,8 +28,8 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Cost difference that makes a frame sure. Every interpretation that reads the frame's first byte
-in another way must cost at least this much more.
+"""Cost difference that makes a frame sure. Each interpretation that reads the frame's first byte in
+another way must cost at least this much more than the cheapest one.
 
 With this difference, the other interpretation is at least 30 times less likely.
 """

@@ -61,7 +61,7 @@ class Firmware:
 class Fault:
     """A planned fault of one Teensy.
 
-    ``at_s``: when the fault occurs, in s after construction.
+    ``at_s``: when the fault occurs, in s of simulated time since the board was constructed.
 
     ``half``: the Teensy, ``drive`` or ``front``. ``what``: a name in ``faults.py``.
     """

@@ -24,7 +24,7 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 _AS_NUMBERED = (1, 2, 3)
 
 SLIP_CORRELATION_M = 0.1
-"""Rim distance over which the slip of a wheel becomes uncorrelated, in m."""
+"""Distance in m that a wheel's rim rolls until its slip no longer depends on its earlier slip."""
 
 
 @dataclass(frozen=True, slots=True)

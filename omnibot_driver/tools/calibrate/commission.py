@@ -144,9 +144,9 @@ class Walk:
         again = drift(log.odometry, began_s + SETTLING_S, began_s + JOG_S)
         right = frame == "wheel_counts" or frame_is_right(fast, again, turned_rad)
         found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
-        verdict = "as set" if right else "because the odometry shows the drive in a new direction"
+        verdict = "as set" if right else f"not {frame}: the odometry shows it in a wrong direction"
         say(
-            f"Result of a forward drive after a turn by {turned_rad:.2f} rad: delta_frame is"
+            f"The robot has turned by {turned_rad:.2f} rad and driven forward. So delta_frame is"
             f" {found.delta_frame}, {verdict}."
         )
 

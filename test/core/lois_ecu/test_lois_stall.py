@@ -210,13 +210,15 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 ) -> None:
     """The right wheel's reported speed stays the same while the left wheel's speed varies.
 
-    The board may be repeating an old speed of a right wheel that is at rest. But the reported speed
-    is higher than the speeds that the board usually repeats, so the wheel may also roll. The driver
-    sends RPM 0/0. This clears the old speed, so that a wheel at rest starts again. The driver does
-    not subtract the right wheel's distance from the odometry, because the wheel may have rolled.
+    The right wheel may be at rest while the board repeats the wheel's last speed. Or it may roll
+    steadily, because this speed is higher than the last speed of most wheels that stop.
 
-    ``right_rpm``: reported speed of the right wheel. Its set-point is −31 RPM. At −68 RPM, the
-    controller of the wheel is saturated and keeps full power.
+    The driver provides for both cases. It sends RPM 0/0, because a wheel at rest may get no power
+    until this command clears the old speed. It does not subtract the right wheel's distance from
+    the odometry, because the wheel may have rolled.
+
+    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. A wheel at −30 RPM
+    rolls near its set-point. A wheel at −68 RPM gets full power from a saturated controller.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

@@ -263,7 +263,7 @@ def trouble(trial: Trial) -> str:
         return "the server hangs"
     if not carrier.stands:
         return "the robot moves"
-    return "the server is given up" if trial.wishes and lost else ""
+    return "the driver regards the server as lost" if trial.wishes and lost else ""
 
 
 SETS: Final[dict[str, Callable[[], Iterator[Trial]]]] = {

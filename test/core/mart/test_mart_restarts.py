@@ -280,9 +280,10 @@ def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_lose
 ) -> None:
     """The server restarts during a drive, and the motors keep running.
 
-    The network loses and duplicates datagrams. The stops have found no motion, but the robot moves.
-    The driver sends MCS at once. It does not wait until the robot has coasted, because it does not
-    coast.
+    The network loses and duplicates datagrams. The restarted server knows of no motion, so the
+    driver's stops have no effect. The driver then switches the motors off with MCS. It usually
+    waits before that until the robot has rolled out. Here the motors still run, so it sends MCS
+    at once.
     """
     faults = NetworkFaults(lose=0.05, duplicate=0.05, delay_s=0.05)
     bench = MartBench(faults=faults, seed=seed).ready()

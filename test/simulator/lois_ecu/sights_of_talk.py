@@ -93,7 +93,7 @@ def deaf_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_counting(quirks: Quirks) -> bool:
-    """Return whether the board, at full speed, loses over 10 % of lines that are not repeated."""
+    """Return whether the board, at full motor power, loses over 10 % of lines sent only once."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(100, 100))
