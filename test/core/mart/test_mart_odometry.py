@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of odometry when replies are lost, late or doubled, or belong to another query."""
+"""Tests of the odometry and its covariance when requests or replies are lost, late or doubled."""
 
 import math
 from dataclasses import astuple
@@ -10,15 +10,10 @@ import pytest
 from honesty import RARE, nees
 from mart_bench import MartBench
 
-from omnibot_driver.core.mart import MartSettings, State, parse, words
-from omnibot_driver.core.mart.conversation import Answer, Conversation
+from omnibot_driver.core.mart import MartSettings, State
 from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.odometry import MartOdometry
-from omnibot_driver.core.mart.polls import Polls
-from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.states import Motion
-from omnibot_driver.core.mart.stopping import REPEAT_S, Stopping
-from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
 
@@ -216,109 +211,6 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
     assert odometry.doubt.total([]).xx < 0.05**2
 
 
-def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies show that a motion had begun before it was stopped.
-
-    The result is None if they do not show whether it had begun. The driver requests the motion at
-    8 s, and a stop at 10 s and 10.3 s. ``replies``: time in s and bytes of each reply.
-    """
-    stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
-    stop.due(10.0)
-    for at_s, data in replies:
-        if at_s > 10.0 + REPEAT_S:
-            stop.due(10.0 + REPEAT_S)
-        stop.hear(parse(data), at_s)
-    return stop.began
-
-
-def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """The reply to the first stop shows whether the motion had begun before this stop.
-
-    The reply "no motion" to a second stop does not show this, because the first stop may have ended
-    the motion.
-    """
-    assert stopped((10.2, b"fail no motion")) is False
-    assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
-    assert stopped((10.2, b"fail insufficent clearence")) is True
-    assert stopped((10.4, b"fail no motion")) is None
-
-
-def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: float) -> Answer:
-    talk.ask(word.request(), at_s)
-    answer = talk.hear(parse(reply), at_s + took_s)
-    assert answer is not None
-    return answer
-
-
-def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A copy of the encoder count arrives after a sonar query.
-
-    The driver does not take this copy for a distance.
-    """
-    talk = Conversation(0.3)
-    asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
-    asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
-    talk.ask(words.SFC.request(), 1.02)
-    assert talk.hear(parse(b"ok 1792"), 1.06) is None
-    answer = talk.hear(parse(b"ok 141"), 1.08)
-    assert answer is not None
-    assert not answer.when.doubtful
-
-
-def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
-    """The server answers two different queries (MCSTAT and ENC) with 0, again and again.
-
-    Although the answers are equal, the driver does not take one answer for a copy of another.
-    """
-    talk = Conversation(0.3)
-    for n in range(3):
-        asked(talk, words.MCSTAT, b"ok 0", 1.0 + 0.1 * n, 0.01)
-        asked(talk, words.ENC, b"ok 0", 1.05 + 0.1 * n, 0.01)
-
-
-def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """The replies to RMRA (heading query) and then to RMCS (change of speed) have the same angle.
-
-    The driver does not take the reply to RMCS for a copy of the reply to RMRA.
-    """
-    talk = Conversation(0.3)
-    asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
-    asked(talk, words.RMRA, b"ok 2.00", 1.0, 0.01)
-    asked(talk, words.RMCS, b"ok 2.00", 1.02, 0.01)
-
-
-def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """The driver waits for a missing reply. A copy of an older reply arrives instead.
-
-    The driver recognises the copy, and continues to wait. Meanwhile it sends no other query whose
-    reply has the same form: the missing reply could be mistaken for the reply to this query.
-    """
-    talk = Conversation(0.3)
-    asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
-    talk.ask(words.SFC.request(), 1.1)
-    talk.give_up(1.2)
-    assert talk.hear(parse(b"ok 5"), 1.21) is None
-    assert not talk.may_ask(words.SRC, 1.22)
-    assert talk.hear(parse(b"ok 141"), 1.23) is None
-    assert talk.may_ask(words.SRC, 1.24)
-
-
-def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
-    """The driver leaves more than 0.35 s between two sonar queries.
-
-    Both sonars report -1 if nothing is near, so replies differ only in time.
-    """
-    polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
-    for tick in range(1000):
-        now = tick * 0.01
-        for word in polls.due(State.STILL, now)[:1]:
-            if word in asked_s:
-                assert now - max(asked_s.values()) > 0.35
-                asked_s[word] = now
-            polls.asked(word, now)
-    assert min(asked_s.values()) > 8.0
-
-
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
     """A doubtful encoder count may in fact be the reply to a sonar query.
 
@@ -354,20 +246,6 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
     assert abs(wrong_m) < 3.0 * math.sqrt(odometry.doubt.total([]).yy)
 
 
-def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A speed change acts twice if the network duplicates its request.
-
-    This looks as if the motors were unequal. So the driver assumes at most 8 % difference between
-    the motors, whatever it measures.
-    """
-    loop = SpeedLoop(MartSettings())
-    loop.begin(30, False, 0.0)
-    for tick in range(100):
-        loop.measured(0.01, -0.015, 0.05, tick * 0.05)
-    assert loop.balance == pytest.approx(1.0 + 0.08)
-    assert loop.left_over_right == pytest.approx(1.0 + 0.08)
-
-
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
     """The odometry is reset during a controlled move.
 
@@ -399,22 +277,6 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
     odometry.counted(2, at(1.07))
     covariance = odometry.told(1.13, blind_since_s=None).covariance
     assert covariance.yaw_yaw > 0.03**2
-
-
-@pytest.mark.parametrize(("reverse", "most"), [(True, 5), (False, 15)])
-def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
-    reverse: bool, most: int
-) -> None:
-    """The network may duplicate the request of a speed change. The change then acts twice.
-
-    Only the heading can show that a change has acted twice, and in a backward drive, the heading
-    may be unknown. So the driver limits each change: to 15 units in a forward drive, and, on a slow
-    network as in this test, to 5 units in a backward drive.
-    """
-    loop = SpeedLoop(MartSettings())
-    loop.trip_s = 0.05
-    loop.begin(20, reverse, 0.0)
-    assert loop.change(0.4, 0.0, 1.0) == (most, most)
 
 
 def test_a_start_before_any_heading_has_a_finite_covariance() -> None:

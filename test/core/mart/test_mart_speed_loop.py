@@ -170,3 +170,33 @@ def test_unanswered_changes_are_judged_by_the_measured_speeds(
         turn_radps = (right_mps - left_mps) / settings.track_m
         loop.measured((right_mps + left_mps) / 2 * STEP_S, turn_radps * STEP_S, STEP_S, now)
     assert [loop._right.units, loop._left.units] == true
+
+
+def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
+    """A speed change acts twice if the network duplicates its request.
+
+    This looks as if the motors were unequal. So the driver assumes at most 8 % difference between
+    the motors, whatever it measures.
+    """
+    loop = SpeedLoop(MartSettings())
+    loop.begin(30, False, 0.0)
+    for tick in range(100):
+        loop.measured(0.01, -0.015, 0.05, tick * 0.05)
+    assert loop.balance == pytest.approx(1.0 + 0.08)
+    assert loop.left_over_right == pytest.approx(1.0 + 0.08)
+
+
+@pytest.mark.parametrize(("reverse", "most"), [(True, 5), (False, 15)])
+def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
+    reverse: bool, most: int
+) -> None:
+    """The network may duplicate the request of a speed change. The change then acts twice.
+
+    Only the heading can show that a change has acted twice, and in a backward drive, the heading
+    may be unknown. So the driver limits each change: to 15 units in a forward drive, and, on a slow
+    network as in this test, to 5 units in a backward drive.
+    """
+    loop = SpeedLoop(MartSettings())
+    loop.trip_s = 0.05
+    loop.begin(20, reverse, 0.0)
+    assert loop.change(0.4, 0.0, 1.0) == (most, most)
