@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fixtures: a simulated robot for each test module, and a connection to the robot's driver."""
+"""Fixtures: a simulated robot for each test module, a connection to its driver, and a drive."""
 
 from collections.abc import Iterator
 
 import pytest
 from calibrate_rig import Rig, rig, robot_of
+from drives import Drive
 
 from omnibot_driver.tools.calibrate.robot import Robot
 
@@ -26,3 +27,9 @@ def robot(rigged: Rig) -> Iterator[Robot]:
         if robot._estop:
             robot.call("estop", False)
         yield robot
+
+
+@pytest.fixture
+def drive() -> Drive:
+    """Return a healthy synthetic drive, which a test may change."""
+    return Drive()

@@ -21,11 +21,6 @@ from omnibot_driver.tools.report.recorder import Recorder
 JOINTS = ("left_wheel_joint", "right_wheel_joint", "front_steering_joint")
 
 
-@pytest.fixture
-def drive() -> Drive:
-    return Drive()
-
-
 @pytest.mark.parametrize(
     ("factor", "advice"), [(0.5, "2 times"), (0.25, "4 times"), (0.8, "Check")]
 )
