@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of how odometry finds its initial heading, follows a restart of the board, and is reset."""
+"""Tests of how odometry finds its initial heading, and how it uses the board's poses."""
 
 import math
 from dataclasses import replace
@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from strategies import axis_signs, headings, small_moves
+from strategies import headings, small_moves
 from synthetic_board import (
     PERIOD_S,
     SETTINGS,
@@ -25,8 +25,6 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import PoseReading
-
-# Heading
 
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
@@ -84,28 +82,6 @@ def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_r
                 pose = replace(pose, y_m=pose.y_m + 0.015, yaw_rad=pose.yaw_rad + 0.04)
             estimates += odometry.settle(replace(pose, restarted=number == 19))
     assert last(estimates) == close(trip.truth, 1e-3)
-
-
-@pytest.mark.parametrize("lost", [20, 25])
-def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
-    """The board restarts. Its first delta does not show that, because its count fits by chance.
-
-    The first pose shows the restart. It lies at the board's new origin, which is as near as the
-    robot may have driven in the gap. The odometry still does not move there.
-    """
-    odometry, estimates = Odometry(SETTINGS), []
-    for number in range(75):
-        estimates += odometry.displace(earth(0.004, 0.0), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(PoseReading(0.004 * (number + 1), 0.0, 0.0))
-    before = last(estimates)
-    for number in range(75 + lost, 105 + lost):
-        still = replace(earth(0.0, 0.0), lost=lost if number == 75 + lost else 0)
-        estimates += odometry.displace(still, number * PERIOD_S)
-        if number % 5 == lost % 5:
-            pose = PoseReading(0.0, 0.0, 0.0, restarted=number < 81 + lost)
-            estimates += odometry.settle(pose)
-    assert last(estimates) == close(before, 0.06)
 
 
 def test_the_first_pose_must_be_confirmed_too() -> None:
@@ -243,86 +219,6 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
     assert last(odometry.displace(earth(0.0, 0.1), 0.0)) == close((0.2, 0.0, 0.0))
 
 
-# Attaching and resetting
-
-
-@pytest.mark.slow
-@given(
-    st.lists(small_moves, min_size=1, max_size=8),
-    st.lists(small_moves, min_size=1, max_size=4),
-    headings,
-    axis_signs,
-)
-def test_a_board_that_restarts_goes_on_from_here(
-    before: list[Pose], after: list[Pose], initial: float, signs: tuple[int, int, int]
-) -> None:
-    """The board restarts and counts from zero again, while odom continues without a jump."""
-    odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
-    attach(odometry, trip.pose)
-    for move in before:
-        odometry.displace(trip.move(*xyyaw(move)), 0.0)
-    trip.board = (0.0, 0.0, 0.0)
-    for number, move in enumerate(after):
-        reading = replace(
-            trip.move(*xyyaw(move)),
-            duration_s=None if number == 0 else PERIOD_S,
-            restarted=number == 0,
-        )
-        assert odometry.displace(reading, 0.0) == []
-    assert last(odometry.settle(trip.pose)) == close(trip.truth, 1e-8)
-
-
-def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
-    """After a reset, pose and covariance are zero, and the x axis points forward."""
-    odometry, trip = Odometry(SETTINGS), Trip(0.7)
-    attach(odometry, trip.pose)
-    for _ in range(10):
-        odometry.displace(trip.move(0.02, 0.01, 0.1), 0.0)
-    odometry.reset()
-    (estimate,) = odometry.displace(trip.move(0.0, 0.0, 0.0), 0.0)
-    assert xyyaw(estimate.pose) == close((0.0, 0.0, 0.0))
-    assert estimate.covariance == Covariance()
-    odometry.settle(trip.pose)
-    assert last(odometry.displace(trip.move(0.1, 0.0, 0.0), 0.0)) == close((0.1, 0.0, 0.0))
-
-
-def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """The odometry is reset before the board has sent its first pose.
-
-    After the first pose, odom contains only the motion since the reset.
-    """
-    odometry, trip = Odometry(SETTINGS), Trip(0.7)
-    for _ in range(3):
-        odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
-    odometry.reset()
-    reading = trip.move(0.01, 0.0, 0.0)
-    estimates = odometry.displace(reading, 0.0) + attach(odometry, trip.pose)
-    assert last(estimates) == close((0.01, 0.0, 0.0))
-
-
-def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """The odometry counts how often its frame is moved relative to the board's earth frame.
-
-    Such a move makes the goals from before it invalid. A reset, for example, moves the odometry
-    frame. Displacements and usual poses do not move it, so they are not counted.
-    """
-    odometry = Odometry(SETTINGS)
-    attach(odometry, PoseReading(1.0, 2.0, 0.0))
-    counted = [odometry.alignments]
-    odometry.displace(earth(0.01, 0.0), 0.0)
-    odometry.settle(PoseReading(1.01, 2.0, 0.0))
-    counted.append(odometry.alignments)
-    for _ in range(2):
-        odometry.settle(PoseReading(500.0, 600.0, 1.0))
-    counted.append(odometry.alignments)
-    odometry.displace(replace(earth(0.0, 0.0), duration_s=None, restarted=True), 0.04)
-    odometry.settle(PoseReading(0.0, 0.0, 0.0))
-    counted.append(odometry.alignments)
-    odometry.reset()
-    counted.append(odometry.alignments)
-    assert [count - counted[0] for count in counted] == [0, 0, 1, 2, 3]
-
-
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
     """The heading is known once two poses of the board agree.
 
@@ -341,60 +237,3 @@ def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
     for _ in range(30):
         assumed.displace(earth(0.01, 0.0), 0.0)
     assert not assumed.heading_known
-
-
-@pytest.mark.parametrize("frame", ["earth", "body"])
-@pytest.mark.parametrize("use_board_pose", [True, False])
-@pytest.mark.parametrize("lost", [5, 20, 40])
-def test_a_reset_after_a_gap_leaves_no_wrong_heading(
-    lost: int, use_board_pose: bool, frame: str
-) -> None:
-    """Displacements are lost while the robot ends a turn. Then the odometry is reset.
-
-    The gap hides where the robot points in the board's frame. The next poses show it, so the motion
-    after the reset has the right direction.
-    """
-    odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
-    attach(odometry, trip.pose)
-    for _ in range(10):
-        odometry.displace(trip.move(0.02, 0.0, 0.04, frame), 0.0)
-    for number in range(lost):
-        trip.move(0.02, 0.0, 0.04 if number < 2 else 0.0)
-    odometry.displace(replace(trip.move(0.02, 0.0, 0.0, frame), lost=lost), 0.0)
-    odometry.reset()
-    trip.truth = (0.0, 0.0, 0.0)
-    estimates = []
-    for number in range(50):
-        estimates += odometry.displace(trip.move(0.02, 0.0, 0.01, frame), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(trip.pose)
-    assert len(estimates) == 50
-    assert last(estimates) == close(trip.truth, 1e-6)
-
-
-@pytest.mark.parametrize("duration_s", [PERIOD_S, None])
-def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
-    duration_s: float | None,
-) -> None:
-    """The odometry is reset in a gap of 3 s, near its end or near its beginning.
-
-    Near the end, the lost motion is older than the reset, so odom does not contain it. Near the
-    beginning, odom contains it.
-    """
-    for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
-        odometry, trip = Odometry(SETTINGS), Trip()
-        attach(odometry, trip.pose)
-        odometry.displace(trip.move(0.0, 0.0, 0.0), 1.0)
-        odometry.reset(now)
-        for _ in range(74):
-            trip.move(0.01, 0.0, 0.0)
-        reading = trip.move(0.01, 0.0, 0.0)
-        if duration_s is None:
-            reading = replace(reading, dx_m=0.75, duration_s=None)
-        else:
-            reading = replace(reading, lost=74)
-        odometry.displace(reading, 4.0)
-        for _ in range(2):
-            odometry.settle(trip.pose)
-        estimates = odometry.displace(trip.move(0.0, 0.0, 0.0), 10.0)
-        assert last(estimates) == close((way_m, 0.0, 0.0), 1e-6)
