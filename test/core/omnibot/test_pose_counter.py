@@ -1,0 +1,233 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of what the counter of the poses shows: lost deltas and restarts."""
+
+import pytest
+
+from omnibot_driver.core.omnibot.sequence import Sequence, Step
+
+
+def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
+    """A pose comes after every fifth delta. The counter of a pose shows that three deltas are lost.
+
+    These losses are counted when the pose arrives. The next delta does not count them again.
+    """
+    sequence = Sequence()
+    for count in range(10):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            assert sequence.pose(count // 5, count * 0.04) == Step(0)
+    for count in (10, 11):
+        sequence.delta(count, count * 0.04)
+    assert sequence.pose(2, 14 * 0.04) == Step(3)
+    assert sequence.delta(16, 16 * 0.04) == Step(1)
+
+
+def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
+    """Twelve deltas are lost, and two poses come in this gap. Each pose shows five lost deltas.
+
+    So the next delta counts only two.
+    """
+    sequence = Sequence()
+    for count in range(10):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    told = [sequence.pose(number, (5 * number + 4) * 0.04) for number in (2, 3)]
+    assert told == [Step(5), Step(5)]
+    assert sequence.delta(22, 22 * 0.04) == Step(2)
+
+
+@pytest.mark.parametrize("poses", [6, 60, 206])
+def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
+    """Deltas are lost for more than 1 s. Then a pose arrives before the next delta.
+
+    The pose's counter shows the losses. By chance, it may be a counter that is also possible after
+    a restart. But after such a long gap, no restart is assumed.
+    """
+    sequence = Sequence()
+    for count in range(300):
+        sequence.delta(count % 256, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    first = 300 + 5 * poses
+    assert sequence.pose((59 + poses) % 256, (first - 1) * 0.04) == Step(5 * poses)
+    for count in range(first, first + 5):
+        assert sequence.delta(count % 256, count * 0.04) == Step(0)
+    assert sequence.pose((60 + poses) % 256, count * 0.04) == Step(0)
+
+
+@pytest.mark.parametrize("lost", [1300, 2600])
+def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(lost: int) -> None:
+    """More than 256 poses are lost, so the counter of the poses wraps. The gap lasts over 51.2 s.
+
+    The next pose is not taken for the first one after a restart.
+    """
+    sequence = Sequence()
+    for count in range(50):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    for count in range(50 + lost, 60 + lost):
+        step = sequence.delta(count % 256, count * 0.04)
+        assert step == Step(lost if count == 50 + lost else 0)
+        if count % 5 == 4:
+            assert sequence.pose(count // 5 % 256, count * 0.04) == Step(0)
+
+
+def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
+    """The board restarts. By chance, its count 0 also fits the last count and the elapsed time.
+
+    The counter of the next pose is also 0. This shows the restart.
+    """
+    sequence = Sequence()
+    for count in range(206):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    after_s = 205 * 0.04 + 2.0
+    assert sequence.delta(0, after_s) == Step(50)
+    for count in range(1, 5):
+        assert sequence.delta(count, after_s + count * 0.04) == Step(0)
+    assert sequence.pose(0, after_s + 0.16).restarted
+
+
+def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
+    """The board restarts, 3 s before its counter would have wrapped to 0.
+
+    By the time, the first count after the restart is a little too high for a wrap, so it is
+    doubtful. But the pose directly after it also begins at 0. No delta is counted as lost then.
+    """
+    sequence = Sequence()
+    for count in range(171):
+        sequence.delta(count, count * 0.04, imus=4)
+        if count % 5 == 0:
+            sequence.pose(count // 5, count * 0.04)
+    sequence.delta(0, 9.84, imus=4)
+    assert sequence.pose(0, 9.84).restarted
+    assert sequence.delta(1, 9.88, imus=4) == Step(0)
+
+
+def reopened() -> Sequence:
+    """Return the state after the deltas 0 to 205, their poses, and a reconnection."""
+    sequence = Sequence()
+    for count in range(206):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    sequence.reconnect()
+    return sequence
+
+
+def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
+    """The port is closed and opened again, and the board has restarted in the meantime.
+
+    By chance, its count 0 fits the last count and the elapsed time. The counter of the next pose
+    shows the restart, as it does while the port stays open.
+    """
+    sequence = reopened()
+    after_s = 205 * 0.04 + 2.0
+    for count in range(5):
+        sequence.delta(count, after_s + count * 0.04)
+    assert sequence.pose(0, after_s + 0.16).restarted
+
+
+@pytest.mark.parametrize("lost", [1, 7, 60, 255, 256, 1280, 1500])
+def test_the_pose_counter_goes_on_while_the_port_is_closed(lost: int) -> None:
+    """The port is closed for a while and the board goes on: no pose shows a restart."""
+    sequence = Sequence()
+    counts = [*range(206), *range(206 + lost, 300 + lost)]
+    for count in counts:
+        if count == 206 + lost:
+            sequence.reconnect()
+        assert not sequence.delta(count % 256, count * 0.04).restarted
+        if count % 5 == 4:
+            assert not sequence.pose(count // 5 % 256, count * 0.04).restarted
+
+
+@pytest.mark.parametrize("first", range(900, 1200, 50))
+def test_after_an_hour_the_pose_counter_does_not_tell_of_a_restart(first: int) -> None:
+    """The port is closed for an hour, and the board goes on. Its clock is slow by 0.3 %.
+
+    So the driver does not know how often the counter of the deltas has wrapped. The counter of the
+    poses then does not fit, which is not taken for a restart.
+    """
+    sequence = Sequence()
+    for count in [*range(first, first + 206), *range(first + 90_000, first + 90_050)]:
+        now = count * 0.04 * 1.003
+        if count == first + 90_000:
+            sequence.reconnect()
+        assert not sequence.delta(count % 256, now).restarted
+        if count % 5 == 4:
+            assert not sequence.pose(count // 5 % 256, now).restarted
+
+
+def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> None:
+    """The board restarts while the port is closed, and a pose is the first frame that arrives.
+
+    The difference of the pose counters means nothing, so the pose contains no known losses.
+    """
+    sequence = reopened()
+    assert sequence.pose(3, 205 * 0.04 + 60.0).lost == 0
+
+
+def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_earlier_losses() -> (
+    None
+):
+    """The port is closed for 1 s. It opens in the middle of a delta, so a pose arrives first.
+
+    The counter of this pose is ignored. The next delta shows how many deltas were lost. The second
+    pose is lost. The counter of the third pose agrees with the deltas, so no restart is assumed.
+    """
+    sequence, restarts = Sequence(), []
+    for count in [*range(25), *range(49, 75)]:
+        now = count * 0.04
+        if count == 49:
+            sequence.reconnect()
+        else:
+            restarts.append(sequence.delta(count, now).restarted)
+        if count % 5 == 4 and count != 54:
+            restarts.append(sequence.pose(count // 5, now).restarted)
+    assert not any(restarts)
+
+
+def test_a_pose_of_another_rhythm_tells_nothing() -> None:
+    """The board sends a pose after every second delta, not after every fifth.
+
+    The counter of a pose then does not show whether deltas were lost.
+    """
+    sequence = Sequence()
+    for count in range(20):
+        assert sequence.delta(count, count * 0.04) == Step(0)
+        if count % 2:
+            assert sequence.pose(count // 2, count * 0.04) == Step(0)
+
+
+def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
+    """The board's pose counter begins at 0 again, after only 1 s. No losses are counted.
+
+    The counter has not wrapped, because a wrap needs more poses than the board sends in 1 s.
+    """
+    sequence = Sequence()
+    for count in range(25):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    assert sequence.pose(0, 25 * 0.04 + 1.0) == Step(0)
+
+
+def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
+    """A delta is lost. The next pose and the next delta are decoded late, almost at the same time.
+
+    The loss is counted when the pose arrives. The next delta does not count it again.
+    """
+    sequence = Sequence()
+    for count in range(11):
+        sequence.delta(count, count * 0.04, imus=4)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    for count in (11, 12, 13):
+        sequence.delta(count, 0.56, imus=4)
+    assert sequence.pose(2, 0.56) == Step(1)
+    assert sequence.delta(15, 0.58, imus=4) == Step(0)
+    assert sequence.delta(16, 0.64, imus=4) == Step(0)
