@@ -65,6 +65,18 @@ def reach(bench: MartBench, goal: Pose) -> str:
     return " ".join(texts)
 
 
+def first_distance(bench: MartBench, x_m: float) -> int:
+    """Command a goal ahead or behind, and return the first requested distance, in inches."""
+    since = len(bench.written)
+    bench.go_to(x_m, 0.0, 0.0)
+
+    def straight() -> list[bytes]:
+        return [data for data in bench.said(since) if data.startswith(b"TF")]
+
+    bench.run_until(lambda: bool(straight()), 30.0)
+    return int(straight()[0].split()[-1])
+
+
 def yaw_error(bench: MartBench) -> float:
     """Return the absolute error of the odometry's heading, in rad."""
     return abs(math.remainder(bench.error.yaw_rad, math.tau))

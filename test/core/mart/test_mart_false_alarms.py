@@ -7,7 +7,7 @@ import math
 import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
-from test_mart_goal import first_distance
+from mart_goals import first_distance
 
 from omnibot_driver.core.mart.goal import INCH_M, STRETCH
 from omnibot_driver.core.mart.moment import Moment

@@ -21,6 +21,7 @@ from omnibot_driver.core.mart.replies import Ok
 from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.stopping import Stopping
 from omnibot_driver.core.mart.words import Form
+from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
@@ -265,3 +266,87 @@ def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
     error_rad = abs(math.remainder(bench.error.yaw_rad, math.tau))
     assert error_rad > 0.05
     assert error_rad < 3 * bench.odometry[-1].covariance.yaw_yaw ** 0.5
+
+
+def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
+    """Change the network so that it loses some commands and duplicates the next RST IMU.
+
+    ``lost``: the network loses each command that begins with one of these words. The copy of RST
+    IMU arrives 0.29 s late. The reply to this copy is delayed by 0.29 s, too.
+    """
+    receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
+    copies: list[float] = []
+    replies: list[float] = []
+
+    def lossy(data: bytes, now: float, channel: int) -> None:
+        if data.startswith(b"RST IMU") and not copies:
+            copies.append(board.now_s + 0.29)
+        if not data.startswith(lost):
+            receive(data, now, channel)
+
+    def late() -> list[Packet]:
+        if copies and copies[0] <= board.now_s:
+            receive(b"RST IMU", board.now_s, 0)
+            copies[0] = math.inf
+        out: list[Packet] = []
+        for packet in advance():
+            if packet[1] == b"ok" and copies == [math.inf]:
+                replies.append(board.now_s + 0.29)
+            else:
+                out.append(packet)
+        due = [at for at in replies if at <= board.now_s]
+        replies[:] = [at for at in replies if at > board.now_s]
+        return out + [(0, b"ok")] * len(due)
+
+    bench.robot.receive = lossy  # type: ignore[method-assign]
+    bench.robot.advance = late  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize(
+    ("firmware", "before", "stops_s"),
+    [
+        (firmware, ((0.0, 0.5), (0.25, 0.0))[(n + m) % 2], stops_s)
+        for n, firmware in enumerate(("firmware", "source"))
+        for m, stops_s in enumerate((0.1, 0.3, None))
+    ],
+)
+def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
+    firmware: Firmware, before: tuple[float, float], stops_s: float | None
+) -> None:
+    """The command for the turn to a goal is lost. Then the late ok to an IMU check arrives.
+
+    The driver must not take this ok for the reply to the turn command. The encoder still shows the
+    count of the previous motion, and the odometry does not add this count again.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*before, 3.0)
+    bench.command(0.0, 0.0, 1.5)
+    lose_and_copy_a_check(bench, (b"MC",))
+    here = bench.odometry[-1].pose
+    bench.go_to(here.x_m, here.y_m, here.yaw_rad - 2.0)
+    bench.run_until(lambda: bench.board._pilot.motion is Motion.TURN, 5.0)
+    bench.run(stops_s or 3.0)
+    bench.command(0.0, 0.0, 3.0)
+    assert bench.error.way_m < 0.05
+    assert abs(bench.error.yaw_rad) < 0.05
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
+    """The command of a backward drive is lost. Then a late ok arrives, the reply to an IMU check.
+
+    The ok looks like a reply to the command. The driver does not trust it, because the network has
+    duplicated replies a short time before. So the odometry adds no motion.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(-0.2, 0.0, 3.0)
+    replies = bench.robot.network[0].from_board
+    replies._faults = NetworkFaults(duplicate=1.0)
+    bench.command(0.0, 0.0, 3.0)
+    replies._faults = NetworkFaults()
+    receive = bench.robot.receive
+    lose_and_copy_a_check(bench, (b"B", b"ENC"))
+    bench.command(-0.2, 0.0, 1.0)
+    bench.robot.receive = receive  # type: ignore[method-assign]
+    bench.command(0.0, 0.0, 4.0)
+    assert bench.error.way_m < 0.05
