@@ -9,6 +9,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.board_time import UNIT_S, BoardTime
+from omnibot_driver.core.lois_ecu.gps_clock import GpsClock
 from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
 from omnibot_driver.core.lois_ecu.messages import (
     BoardOdometry,
@@ -41,10 +42,7 @@ from omnibot_driver.core.lois_ecu.readings import (
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.readings import DisplacementReading
 
-DAY_S: Final = 86400
-UNKNOWN_FROM_YEAR: Final = 38
-"""Two-digit year (38 for 2038). A date from this year on is false: the GPS receiver does not have
-the date yet."""
+MIDNIGHT: Final = GpsTime(0, 0, 0)
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TURNS: Final = 0.3
 RESTARTED_TICKS: Final = 2
@@ -116,11 +114,7 @@ class Translation:
         self._unit_known = False
         self._time, self._late_s = BoardTime(), 0.0
         self._stamp_s: float | None = None
-        self._date: GpsDate | None = None
-        self._dated = False
-        """Whether the last date that the GPS reported is a real one. At midnight ``_date``
-        becomes unknown, but this value does not change."""
-        self._clock = (0, 0, 0)
+        self._gps_clock = GpsClock()
         self._gps_works = False
 
     def connect(self) -> None:
@@ -179,19 +173,14 @@ class Translation:
                 self._time.sent(POSITION_LINES)
                 located = bool(latitude or longitude)
                 self._gps_works |= located
-                return [FixReading(latitude, longitude, located and self._dated)]
+                return [FixReading(latitude, longitude, located and self._gps_clock.dated)]
             case GpsDate():
                 self._time.sent(1)
-                self._date = report if _is_date(report) else None
-                self._dated = self._date is not None
+                self._gps_clock.set_date(report)
             case GpsTime():
                 self._time.sent(1)
-                clock = (report.hours, report.minutes, report.seconds)
-                if clock < self._clock:
-                    self._date = None  # after midnight there is a new date
-                self._clock = clock
-                self._gps_works |= any(clock)
-                return [TimeReading(self._utc_s(report))]
+                self._gps_works |= report != MIDNIGHT
+                return [TimeReading(self._gps_clock.utc_s(report))]
             case Heading(heading_deg):
                 self._time.sent(1)
                 return self._heading(heading_deg)
@@ -324,7 +313,7 @@ class Translation:
     @property
     def needs_date(self) -> bool:
         """Whether the GPS works, that is, sends a position or a time, but the date is unknown."""
-        return self._gps_works and self._date is None
+        return self._gps_works and not self._gps_clock.date_known
 
     @property
     def ticks(self) -> Ticks | None:
@@ -357,27 +346,3 @@ class Translation:
         magnetic_rad = math.radians(heading_deg)
         yaw_rad = math.pi / 2 - (magnetic_rad + self.settings.declination_rad)
         return [HeadingReading(math.remainder(yaw_rad, math.tau))]
-
-    def _utc_s(self, time: GpsTime) -> int | None:
-        date = self._date
-        if date is None:
-            return None
-        day = _days_since_1970(2000 + date.year, date.month, date.day)
-        return day * DAY_S + time.hours * 3600 + time.minutes * 60 + time.seconds
-
-
-def _is_date(date: GpsDate) -> bool:
-    """Return whether ``date`` is a real date from the GPS receiver.
-
-    While the receiver does not have the date, it sends zeros or a false year. Dates from 2038 on
-    are rejected too, because they do not fit into a ROS time.
-    """
-    return bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
-
-
-def _days_since_1970(year: int, month: int, day: int) -> int:
-    """Return the number of days since 1970 in the Gregorian calendar."""
-    # Years begin in March, so that the leap day is the last day of a year.
-    year, month = (year, month - 3) if month > 2 else (year - 1, month + 9)
-    leap_days = year // 4 - year // 100 + year // 400
-    return 365 * year + leap_days + (153 * month + 2) // 5 + day - 1 - 719468
