@@ -17,10 +17,10 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A small turn that the driver makes in a drive if the reported heading is constant.
+"""A small turn that tests the IMU in a drive in which the reported heading is constant.
 
-The turn is a test of the IMU, because a working IMU reports the turn. Without the turn, a straight
-drive and a dead IMU would look the same.
+A working IMU reports the turn. Without the turn, a straight drive and a dead IMU would look the
+same.
 
 ``WAG_S``: time in s for which the heading is constant before the driver makes this turn.
 

@@ -213,8 +213,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply is recorded as missing and may come late. Exception: the reply to a controlled
-        move is not recorded here, because the driver waits for it while it stops the move.
+        The reply is recorded as missing, and may come late. Only the reply to a controlled move is
+        not recorded, because the stop of the move waits for it.
         """
         if self.pending is None:
             return None

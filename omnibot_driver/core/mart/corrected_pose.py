@@ -23,11 +23,10 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Standard deviations of the first run of a controlled move that the robot makes twice.
+"""Standard deviations of the estimated first run of a controlled move that the robot made twice.
 
-The robot makes a move twice if the network delivers the request twice. Only the second run is
-measured. The distance or turn of the first run is estimated, and these values describe the error of
-the estimate.
+If the network delivers a request twice, the robot makes the move twice, and only the second run is
+measured.
 ``RUN``: the part of the error that grows with the estimate, as a fraction of the estimate.
 ``END_RUN_M``, ``END_RUN_RAD``: the constant part of the error, in m and in rad.
 """
@@ -82,8 +81,8 @@ class CorrectedPose:
     def run_before(self, is_straight: bool, amount: float) -> None:
         """Add the first run of a controlled move to the pose, if the robot has made the move twice.
 
-        A duplicate of the request has started a second run, and only this run was measured. The
-        first run is regarded as complete.
+        A duplicate of the request has started a second run, and only the second run was measured.
+        The first run is assumed to be complete.
 
         ``amount``: the expected distance of a complete run in m, or its expected turn in rad.
         """
@@ -99,9 +98,8 @@ class CorrectedPose:
     def lose_turn(self) -> None:
         """Increase the uncertainty, because the robot may have turned by an unknown angle.
 
-        For example, the server restarts in a motion. During the restart, the motors keep their last
-        command, so the robot may turn. After it, the server's relative heading begins at zero, so
-        it does not show this turn.
+        For example, the server restarts in a motion, and the motors keep their last command
+        meanwhile. The server's relative heading then begins at zero, so it does not show this turn.
         """
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
@@ -118,9 +116,9 @@ class CorrectedPose:
         """End a turn on the spot: correct the heading, and return the correction in rad.
 
         If the server has reported a plausible angle, or none, the correction is zero. An
-        implausible angle has one of two reasons: it belongs to another motion, or only one of the
-        wheels has turned. The driver cannot know which one. So it uses the angle from the encoder
-        count instead, and adds the difference between the two angles to the uncertainty.
+        implausible angle belongs to another motion, or only one of the wheels has turned; the
+        driver cannot know which. So the angle from the encoder count is used instead, and the
+        difference between the two angles is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

@@ -55,9 +55,8 @@ random error divided by the constant error, both as standard deviations.
 ASTRAY: Final = 0.7
 """Factor for a position error that an uncertain heading causes.
 
-This error, as a fraction of the driven distance, is the factor times the variance of the heading
-(rad²), but at most 1. An error of this size is assumed along the motion, and a second one across
-it.
+The error, as a fraction of the driven distance, is this factor times the variance of the heading
+(rad²), but at most 1. One such error is assumed along the motion, and another one across it.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
@@ -135,18 +134,17 @@ class Doubt:
     def begin(self) -> None:
         """Store the constant heading error at the beginning of a motion.
 
-        Call this when a motion begins. The constant error comes from turns that were computed from
-        the commands, and the new motion may change it. If the server reports the heading during
-        this motion, ``heading_told`` sets the error back to the stored value.
+        In the motion, turns that are computed from the commands may change this error. If the
+        server reports the heading during the motion, ``heading_told`` restores the stored value.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
         """Remove the constant heading error of this motion, because the server reports the heading.
 
-        Until this report, the turn of the motion was computed from the commands, which caused the
-        error. Two errors stay in the covariance: the random heading error, and the position error
-        that the constant heading error has caused.
+        The error comes from the time before this report, in which the turn was computed from the
+        commands. The random heading error stays in the covariance, and so does the position error
+        from the wrong heading.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad

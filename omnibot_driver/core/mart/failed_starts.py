@@ -84,10 +84,10 @@ class FailedStarts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        If the reported reason is not an obstacle, the result is True. If it is an obstacle, the
-        obstacle may have ended an earlier backward drive, or it may be in front of the robot. The
-        driver assumes that it is in front in two cases: the front sonar detects an obstacle too, or
-        RM reports an obstacle again. The result is then False.
+        For a reported reason other than an obstacle, the result is True. An obstacle may have ended
+        an earlier backward drive, or may be in front of the robot. The driver assumes that the
+        obstacle is in front, and the result is False, if the front sonar detects an obstacle too,
+        or if RM reports an obstacle again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -119,9 +119,8 @@ class Done:
     def contradicts_the_server(self) -> bool:
         """Whether the encoder shows a wrong turn, but the server has reported a completed turn.
 
-        The turn was wrong if the right wheel has turned much less or much more than the turn
-        requires. The server ends a turn by the gyro. Therefore, it may not notice a wheel that is
-        stuck or slips.
+        In a wrong turn, the right wheel has turned much less or much more than required. The server
+        ends a turn by the gyro, so it may not notice a wheel that is stuck or slips.
         """
         if self.is_straight or not self.completed or not self.is_large:
             return False
@@ -149,9 +148,8 @@ class Done:
     def ended_late(self) -> bool:
         """Whether the reply came so late that the server may have run the move twice.
 
-        If the network has duplicated the request, the server runs the move twice, and answers each
-        run. If the network also loses the answer to the first run, the driver receives only the
-        answer to the second run, which comes late.
+        If the network duplicates the request, the server runs the move twice, and answers each run.
+        If the first answer is lost, the driver receives only the second one, which comes late.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -170,8 +168,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply is the answer to another request, but the driver took it for the answer to the
-        move. If the driver then sent a stop to end a possible second run, this stop has ended the
-        first run.
+        Such a reply answers another request, and the driver took it for the answer to the move. A
+        stop that was sent after it, against a possible second run, has then ended the first run.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -43,9 +43,8 @@ WORTH_DEG: Final = 1.0
 WIDER: Final = 0.5
 """Factor by which the allowed heading error increases with each turn since the last straight move.
 
-After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. A turn may go too
-far, and the turn back may go too far again. The increase prevents the robot from turning back
-and forth.
+After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. Without this
+increase, the robot might turn back and forth, because each turn may go too far.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
@@ -129,11 +128,11 @@ class Move:
 
     ``turns``: number of turns since the last straight move.
 
-    ``given_up``: whether the driver sends no further move. The cause is that the robot has arrived,
-    or that the goal has failed.
+    ``given_up``: whether the driver sends no further move, because the robot has arrived or the
+    goal has failed.
 
     ``failed``: whether the goal has failed: a move has failed, or MOST_MOVES moves did not reach
-    it.
+    the goal.
     """
 
     place: Pose

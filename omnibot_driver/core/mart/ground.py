@@ -74,8 +74,8 @@ a server whose stop port hangs."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
-A server that executes the move does not answer HELLO. So if it answers, the move is over and its
-reply is late or lost, or the server was restarted.
+A server that executes the move does not answer HELLO. So an answer shows that the move is over and
+the reply to the move late or lost, or that the server was restarted.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
@@ -290,12 +290,11 @@ class Ground:
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        This is necessary only after a forward drive (RM). The odometry ends this drive with the
-        first encoder count at rest. At that time, it must already have a heading that was measured
-        at rest.
+        This is necessary only after a forward drive (RM). The first encoder count at rest ends this
+        drive in the odometry, and the odometry then needs a heading that was measured at rest.
 
-        The driver waits for at most HEADING_S (s), plus HEADING_TRIPS times the duration of a
-        query. If no heading has come by then, it logs NO_HEADING once.
+        The wait lasts at most HEADING_S (s), plus HEADING_TRIPS times the duration of a query. If
+        no heading has come by then, the driver logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

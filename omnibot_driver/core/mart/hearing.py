@@ -23,9 +23,9 @@ BLIND_PART: Final = 0.15
 """Largest relative change of the motors' units after which a missing reply does not stop the robot.
 
 This applies to a backward drive (B) in which the server reports no headings. The driver then
-computes the robot's turn from the motors' units. If the reply to a change is missing, the driver
-does not know which units apply. After a small change, the turn is still known well enough. After a
-larger change it is not, so the driver stops the robot.
+computes the robot's turn from the motors' units. If a change is not answered, the driver does not
+know which units apply. The turn is still known well enough after a small change, but not after a
+larger one.
 """
 
 

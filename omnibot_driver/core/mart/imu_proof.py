@@ -3,9 +3,8 @@
 """The check that the IMU works, and the results of the last checks.
 
 The driver checks the IMU with the command RST IMU, or with MCR SLOW 0. After a failed RST IMU, the
-server does not use the IMU until a later RST IMU succeeds. So the driver repeats the command. This
-module knows replies and times; it does not know which motion is started. The caller passes the
-time.
+server does not use the IMU until RST IMU succeeds, so the driver repeats the command. This module
+knows replies and times; it does not know which motion is started. The caller passes the time.
 """
 
 import math

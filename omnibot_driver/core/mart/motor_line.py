@@ -75,9 +75,9 @@ class MotorLine:
     def stood(self, units: float) -> None:
         """Record that the motor does not turn with ``units``.
 
-        If the line gives a positive speed for these units, lower its offset, so that the speed
-        becomes zero. The true cause may be an obstacle, so the offset is then as uncertain as
-        before the line learned anything.
+        If the line gives a positive speed for these units, lower its offset until the speed is
+        zero. The cause may also be an obstacle, so the offset becomes as uncertain as before the
+        line learned anything.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2

@@ -99,9 +99,9 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of the motors' speeds (left / right) if each motor has ``units``.
 
-        The ratio is computed from what the driver has learned about the motors (``MotorLine``). A
-        ``MotorLine`` can be wrong, because the network may have lost or duplicated a request to
-        change the speed. Therefore, the ratio is limited to ``motor_balance`` ± MOST_UNEQUAL.
+        The ratio comes from the learnt ``MotorLine`` of each motor, but is limited to
+        ``motor_balance`` ± MOST_UNEQUAL. A ``MotorLine`` can be wrong, because the network may have
+        lost or duplicated a request to change the speed.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))

@@ -128,10 +128,10 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        The server's record of a turn is more exact than the wheel's measurement. So after a turn,
-        the driver downloads the record, and learns from it later. It learns from the wheel's
-        measurement at once in three cases: the network is bad, the driver needs no more records, or
-        another job is in progress.
+        After a turn, the driver downloads the server's record, which is more exact than the wheel's
+        measurement, and learns from the record later. It learns from the wheel's measurement at
+        once if the network is bad, if the driver needs no more records, or if another job is in
+        progress.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -227,8 +227,8 @@ class Moves(Asking):
 
         * The driver has sent no stop after the move.
         * The move was complete, and the server answered again very soon. A second run would have
-          delayed this answer: a stop of the run takes at least ``LEAST_STOP_S``, and a run that
-          ends by itself takes about as long as the move.
+          delayed this answer by ``LEAST_STOP_S`` or more if it was stopped, and by about the
+          duration of the move if it ended by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

@@ -36,9 +36,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of the current controlled move. It is also given after the
-        move, as long as the server may run this move a second time. At all other times, and if the
-        server is lost, it is None.
+        ``blind_since_s``: start time of the current controlled move, also after the move while the
+        server may run it a second time. Otherwise, and if the server is lost, it is None.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

@@ -44,15 +44,15 @@ STOPS_S: Final = 1.0
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 """Time in s between the server's first reply and the first query of the battery voltage (VOLTS).
 
-VOLTS crashes a server that is starting up, and a server that was silent may have been restarted. So
-the driver does not send VOLTS earlier. It does not send VOLTS later either: it needs the voltage
-before the first motion, which can begin STARTS_UP_S after the first reply.
+VOLTS crashes a server that is starting up, and the first reply may come from such a server, so
+VOLTS is not sent earlier. It is not sent later, because the driver needs the voltage before the
+first motion, which can begin STARTS_UP_S after the first reply.
 """
 VOLTS_S: Final = 10.0
 """Time in s since the last voltage query (VOLTS) after which the next one is sent in any case.
 
-VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
-the driver usually waits after such a request before it sends VOLTS. This time limits the wait.
+Usually, VOLTS is not sent soon after an unanswered request: the server may have restarted, and
+VOLTS crashes a server that is starting up. ``VOLTS_S`` limits this wait.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -130,9 +130,11 @@ class Pilot(Hearing):
     def fell_silent(self) -> None:
         """Begin a new connection after a long silence, because the server may have been restarted.
 
-        Do nothing during a motion or a job. Do nothing either if the server's stop port may hang
-        (``Health.outlived``): a failure of the network may have caused the silence, and after such
-        a failure, the port still hangs.
+        Do nothing in two cases:
+
+        * During a motion or a job.
+        * If the server's stop port may hang (``Health.outlived``). The silence may only come from
+          the network, and then the port still hangs.
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()
@@ -245,9 +247,9 @@ class Pilot(Hearing):
     def _copy_stop_s(self) -> float:
         """The time at which the driver must stop a suspected duplicate of a controlled move.
 
-        The driver stops the duplicate with the commands SL and SS. The time is infinity if the
-        driver suspects no duplicate. It is also infinity in every state except STILL: after a
-        forward or backward drive, SL and SS would hang the server.
+        The driver stops it with the commands SL and SS. The time is infinity if no duplicate is
+        suspected, and in every state except STILL: after a forward or backward drive, SL and SS
+        would hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf

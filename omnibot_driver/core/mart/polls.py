@@ -36,9 +36,9 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 In states that are not listed here, the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between their queries. With less time, a late copy of one
-sonar's reply could be mistaken for the reply of the other sonar. The values would not show this
-mistake, because both sonars report the same value if nothing is near."""
+"""The two sonars, and the least time in s between their queries. In a shorter time, a late copy of
+one sonar's reply could be taken for the other's reply. The values would not show the mistake,
+because both sonars report the same value if nothing is near."""
 
 
 class Polls:
@@ -56,9 +56,8 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The most urgent query is the one with the smallest sum of due time and period. The sum of a
-        query grows each time the query is sent. So each query that waits is the most urgent one at
-        some time, even if exchanges are slow.
+        The most urgent query has the smallest sum of due time and period. This sum grows each time
+        the query is sent, so each query has its turn, even if exchanges are slow.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]

@@ -146,9 +146,8 @@ class Reckoning(CorrectedPose):
     def rest(self, longest: float = math.inf) -> float:
         """End the motion. Call this after its last encoder count, which includes the coasting.
 
-        After a turn on the spot, the angle from the wheel's encoder is compared with the angle from
-        the server. If the server's angle is implausible, return the encoder's angle minus the
-        server's angle, in rad. In all other cases, return 0.
+        After a turn on the spot for which the server has reported an implausible angle, return the
+        angle from the wheel's encoder minus the server's angle, in rad. Otherwise, return 0.
 
         ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
         """
@@ -245,10 +244,9 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        As long as the start command may have been lost, the last encoder count may be from before
-        the start, or it may show a motion after the start. The pose assumes that it is from before
-        the start. This property returns the motion that the count shows if it is from after the
-        start. If there is no such count, both values are zero.
+        While the start command may have been lost, the pose assumes that the last encoder count is
+        from before the start. If the count is from after the start, the pose lacks the motion that
+        the count shows, and these values are that motion. In all other cases, both values are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

@@ -23,15 +23,13 @@ OLD_RAD: Final = 0.01
 """Largest difference in rad between two headings that are regarded as the same heading.
 
 A forward drive (RM) sets the server's heading to zero. If the first heading after the start of RM
-is the same as the last heading before RM, it may come from a late reply: the server may have
-measured it before RM.
+is the same as the last one before, it may be a late reply with a heading from before RM.
 """
 MOST_RAD: Final = 1e7
 """Limit in rad. A reported heading of this size or more is rejected.
 
-The server integrates the turn rate over time, in unsigned milliseconds. If the server's clock is
-set back, a time step is negative. As an unsigned number, this step is huge, so the server reports
-1e15 degrees, for example.
+The server integrates the turn rate over time, in unsigned milliseconds. If its clock is set back, a
+negative time step becomes a huge one, and the server reports 1e15 degrees, for example.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is predicted after its last report."""

@@ -72,14 +72,13 @@ NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units.
 
-The variance grows by one of these factors, times the square of the relative change.
+The variance grows by one of these factors, times the square of the relative change. The factors are
+large, because a wrong ratio lasts for the whole motion.
 
-``COPIED``: the factor if the network may deliver the change twice. The driver assumes this if
-queries take longer than ``SLOW_TRIP_S`` (s).
+``COPIED``: for a change that the network may deliver twice. The driver assumes this if queries take
+longer than ``SLOW_TRIP_S`` (s).
 
-``MISSED``: the factor if the server did not answer the change.
-
-Both factors are large, because a wrong ratio lasts for the whole motion.
+``MISSED``: for a change that the server did not answer.
 """
 
 
@@ -139,9 +138,8 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors.
 
-        The number of units is at least LEAST_UNITS, and at most 60. Within these limits, it is what
-        the slower wheel needs for its speed. If an earlier start turned no motor, it can be more
-        than the wheel needs.
+        The result is what the slower wheel needs for its speed, but at least LEAST_UNITS and at
+        most 60. It can be more if an earlier start turned no motor.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -160,9 +158,9 @@ class SpeedLoop(Motors):
 
         ``units``: the units that both motors have; None for the current units of each motor.
 
-        The driver learns from this that these units are not enough to turn the motor. It does not
-        learn from a motor with MOST_DEAD units or more: these units are enough for every motor, so
-        such a motor is regarded as blocked.
+        These units are then regarded as too few to turn the motor. Exception: MOST_DEAD units or
+        more turn every motor, so such a motor is regarded as blocked, and nothing is learned from
+        it.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -264,9 +262,8 @@ class SpeedLoop(Motors):
     def _judge_missed(self, *, right_only: bool) -> None:
         """Undo the unanswered changes of the units that have probably not arrived at the server.
 
-        The server has not answered the changes in ``_missed``, so it is unknown which of them have
-        arrived. The driver tries all combinations of arrived and lost changes. It assumes the
-        combination whose units fit the measured speeds best.
+        For each change in ``_missed``, it is unknown whether it has arrived. The driver assumes the
+        combination of arrived and lost changes whose units fit the measured speeds best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:

@@ -126,11 +126,10 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The driver checks the IMU before each turn. The caller must send SSP before this check of
-        the IMU.
+        The caller must send SSP before the check of the IMU that precedes each turn.
 
         ``delay_s``: shortest time in s between two SSP requests. After this time, no copy of the
-        first of the two requests can arrive any more.
+        first one can arrive any more.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -276,11 +275,9 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Forget what was learned from the previous turn, if it was slow and this turn is fast.
 
-        A slow turn before a fast one shows that something held the robot in the slow turn.
-
-        If this turn is slow, something may hold the robot now. So store what the driver knows
-        before it learns from this turn. If the next turn is fast, the next call restores this
-        knowledge.
+        In this case, something has held the robot in the slow turn. If this turn is slow, something
+        may hold the robot now. So the present knowledge is stored, and the next call restores it if
+        the next turn is fast.
 
         ``part``: this turn's measured rate divided by its commanded rate.
         """

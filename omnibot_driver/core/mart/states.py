@@ -148,15 +148,15 @@ NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
 With a dead IMU, the server does not answer most of these commands: it starts the motors, or waits
-for the IMU. It answers only the controlled turns MCR and MCL. This answer is a failure that names
-the dead IMU. Before the answer, some servers turn the robot for 0.5 s.
+for the IMU. Only the controlled turns MCR and MCL get an answer, a failure that names the dead IMU.
+Before this answer, some servers turn the robot for 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
 """Commands that do harm if a duplicate of them arrives after another motion has begun.
 
-So before the next start, the driver waits until no duplicate of such a command can arrive. If the
-start needs a check of the IMU, the driver checks the IMU after this wait.
+Before the next start, the driver waits until no duplicate of such a command can arrive. A check of
+the IMU that the start needs comes after this wait.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

@@ -2,9 +2,9 @@
 
 """The stop of one motion: the commands to send until the server has acknowledged the stop.
 
-The network may deliver a stop command before the start command of the motion. Then the motion
-begins after the stop. So a single reply to a stop command does not always prove that the motion has
-ended. This module knows commands, replies and times; it does not know why the robot is stopped.
+If the network delivers a stop command before the start command, the motion begins after the stop.
+So a single reply to a stop command does not always prove that the motion has ended. This module
+knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
@@ -57,10 +57,9 @@ later: before its reply, it waits 0.75 s for the robot to stop.
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels did not stop in time.
 
-    The motors are off after this failure. If the motion is a controlled turn, the server may report
-    the failure with a wrong text: that the turn has not begun. If the turn lasted longer than
-    ``NO_START_S``, it has certainly begun. So this text then means that the wheels did not stop in
-    time.
+    The motors are off after this failure. For a controlled turn, the server may report it with a
+    wrong text: that the turn has not begun. After ``NO_START_S``, a turn has certainly begun, so
+    this text then means that the wheels did not stop in time.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """
@@ -75,11 +74,11 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of earlier requests whose replies are still missing. A request is counted only
-    if its reply looks like a reply to a stop command.
+    ``owed``: number of earlier requests whose missing reply would look like a reply to a stop
+    command.
 
-    ``move``: the controlled move to stop; None if the motion is another one. The server's reply to
-    the move itself ends the stop.
+    ``move``: the controlled move to stop; None for another motion. The server's reply to the move
+    ends the stop.
 
     ``planned``: whether the motion is stopped without a fault, only because another motion or a
     standstill is wanted.
@@ -189,10 +188,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        The replies to ``owed`` earlier requests may still come late. If there are at most ``owed``
-        doubtful replies, all of them may be such late replies, and the value is None. If there are
-        more, the value is the last doubtful reply with a plausible number. If no number is
-        plausible, it is the last doubtful reply.
+        If there are at most ``owed`` doubtful replies, all of them may be late replies to earlier
+        requests, and the value is None. If there are more, the value is the last doubtful reply
+        with a plausible number, or the last doubtful reply if no number is plausible.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -37,11 +37,10 @@ FROZEN_S, FROZEN_TIMES = 0.5, 3
 """Limits for a heading that stays constant. The driver stops the robot when both limits are
 reached, because the IMU may be dead, or the robot stuck.
 
-``FROZEN_S``: limit, in s, of the time for which the heading is constant. The driver adds twice the
-average duration of a query to it.
+``FROZEN_S``: limit, in s, of the time. Twice the average duration of a query is added to it.
 
-``FROZEN_TIMES``: limit of the number of replies with the same heading. On a slow network, only few
-replies come within the time limit, and few replies may have the same heading by chance.
+``FROZEN_TIMES``: limit of the number of equal replies. On a slow network, only few replies come
+within the time limit, and they may be equal by chance.
 """
 NO_START_S: Final = 1.5
 """Longest allowed time in s from the start of a motion until the robot moves."""
@@ -61,13 +60,13 @@ moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand still in a drive before it is regarded as blocked."""
 STUCK_S, COASTS_S = 0.5, 0.2
-"""Times in s for which the left wheel may turn unseen. The left wheel has no encoder.
+"""Times in s for which the left wheel, which has no encoder, may turn unseen.
 
-``STUCK_S``: the driver stops the robot because it does not seem to move. If only the right wheel is
-stuck, the left wheel may have turned for this time before the stop.
+``STUCK_S``: before the driver stops a robot that does not seem to move. Perhaps only the right
+wheel is stuck.
 
-``COASTS_S``: the driver stops the robot because a wheel is blocked. When the right wheel is at
-rest, the server ends the measurement of the motion. The left wheel may still coast for this time.
+``COASTS_S``: after the driver has stopped the robot because a wheel is blocked. The server ends the
+measurement when the right wheel is at rest, but the left wheel may still coast.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -291,11 +290,11 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Detect a stop port that still waits for the end of the motion that it should stop.
 
-        The driver has used the stop port. If the server answers a stop command after that, its stop
-        port still waits. It could then hang the next forward drive (RM); see docs/boards/mart.md.
+        This is the case if the server answers a stop command after the driver has used the stop
+        port. The port could then hang the next forward drive (RM); see docs/boards/mart.md.
 
         A reply with a number does not show this. It answers an earlier query, or the stop command
-        of a turn on the spot. A turn on the spot leaves the stop port free.
+        of a turn on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

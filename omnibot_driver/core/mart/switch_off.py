@@ -2,10 +2,9 @@
 
 """The commands that switch off a motor that is on although the server knows of no motion.
 
-The public server may leave a motor on after a straight move (TF or TB). A server that was restarted
-in a motion may have left both motors on. No stop command switches them off. So the driver sends
-MCS, which writes the speeds of both motors. After MCS, the server refuses all motions until it gets
-MSM.
+The public server may leave a motor on after a straight move (TF or TB), and both motors on if it
+was restarted in a motion. No stop command switches them off. So the driver sends MCS, which writes
+the speeds of both motors. After MCS, the server refuses all motions until it gets MSM.
 
 This module knows commands and replies; it does not know when the robot is at rest.
 """
@@ -95,12 +94,12 @@ class SwitchOff:
     def missed(self, word: Word) -> bool:
         """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
 
-        After MOST_MISSES unanswered requests in a row, the driver no longer repeats the request,
-        and allows motions again. If this request was MCS, the driver does not use MCS again until
-        the next connection, or until the motors may run on without a motion (``doubt``).
+        After MOST_MISSES unanswered requests in a row, the request is not repeated, and motions are
+        allowed again. If it was MCS, the driver does not use MCS until the next connection, or
+        until the motors may run on without a motion (``doubt``).
 
-        The server may still execute an unanswered MCS later, and then refuses the next motion. If
-        this happens, the driver sends MSM, which ends the direct control by MCS.
+        The server may execute an unanswered MCS later, and then refuses the next motion. If this
+        happens, the driver sends MSM, which ends the direct control by MCS.
         """
         self._misses += 1
         if self._misses < MOST_MISSES:
