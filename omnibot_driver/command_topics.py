@@ -29,14 +29,14 @@ def obeying(
 ) -> Callable[[Any, MessageInfo], None]:
     """Return a callback that passes each message to ``action``, with the session of the link.
 
-    A message that was in transit for too long is refused instead. ``may_be_old`` and ``is_stop``
-    can except a message from this rule.
+    A message that was in transit for too long is refused, unless ``may_be_old`` or ``is_stop``
+    returns True for it.
 
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: returns True for a message whose time in transit does not matter.
-    * ``is_stop``: returns True for a command to stop, which is obeyed even if it is old.
-    * ``ends_goal``: returns True for a command that ends a drive to a goal even if it is refused.
-      ``ends_goal`` may raise CommandRefused for an invalid message.
+    * ``is_stop``: returns True for a command to stop.
+    * ``ends_goal``: returns True for a command that ends a drive to a goal even if the command is
+      refused. Raises CommandRefused for some invalid messages.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()

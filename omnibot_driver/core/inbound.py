@@ -54,9 +54,9 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        If the bytes change the mode of the board, ``hear`` also calls ``process`` itself. So the
-        change takes effect before the driver handles the next command. In this case, the estimates
-        are added to the reporter's events, and the result is empty.
+        If the bytes change the mode of the board, ``hear`` also calls ``process`` itself, so that
+        the change takes effect before the next command. In this case, the estimates are added to
+        the reporter's events, and the result is empty.
         """
         self._liveness.came_at = now
         before = self._board.mode

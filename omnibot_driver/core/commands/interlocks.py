@@ -47,12 +47,11 @@ class Interlocks:
         return "the driver is shutting down; start it again" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused.
+        """Record that a motion command was refused, by this class or by another one.
 
-        After the motion monitor has stopped the robot, motion may be refused until no command has
-        arrived for some time. A refused command shows that its sender is still active, so this
-        waiting time begins again. Call this method for every refused command, even if another class
-        has refused it.
+        Call this method for every refused command. After a stop by the motion monitor, motion is
+        refused until no command has arrived for some time. Each refused command restarts this time,
+        because its sender is still active.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 
@@ -94,9 +93,8 @@ class Interlocks:
     def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
-        While the board is silent, the driver does not know where the robot is. After a reset at
-        such a time, the next data could contain motion from before the reset. This motion would
-        wrongly be added to the new pose.
+        While the board is silent, a reset is refused. The next data could contain motion from
+        before the reset, and this motion would be added to the new pose.
         """
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN

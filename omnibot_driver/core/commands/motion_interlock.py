@@ -57,9 +57,9 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        The release does not end a refusal after the monitor's first stop. It ends a refusal after
-        the second stop within 60 s, but only if the board has no ~/start. If the board has ~/start,
-        only ~/start ends this refusal.
+        After the monitor's first stop, the release changes nothing. After its second stop within 60
+        s, the release allows motion again if the board has no ~/start; otherwise, only ~/start
+        allows it.
         """
         if self.until is Until.ESTOP:
             self.start()
@@ -70,16 +70,17 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Let the wait for a time without commands begin again, if motion is still refused.
+        """Let the required time without commands begin again, if motion is still refused.
 
         After a first stop by the monitor, motion is refused until no command has arrived for
-        ``timeout_s``. This method begins this wait again at ``now``. It has no effect on a refusal
-        that has ended before.
+        ``timeout_s``. This method lets that time begin again at ``now``.
 
-        Call this method when a command is refused, because its sender is still active. Call it also
-        after a stall of this process, because commands may have arrived unnoticed in the stall.
+        Call this method in two cases:
 
-        ``stalled_s``: length of the stall, in s. The stall does not count as time without commands.
+        * A command was refused. Its sender is still active.
+        * This process has stalled. Commands may have arrived unnoticed.
+
+        ``stalled_s``: length of the stall in s, which does not count as time without commands.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now
@@ -89,8 +90,8 @@ class MotionInterlock:
 
         ``stands``: whether the command is to stand still. Such a command is always allowed.
 
-        ``timeout_s``: time in s. After a first stop by the motion monitor, motion is allowed again
-        when no command has arrived for this time. After a second stop within 60 s, motion remains
+        ``timeout_s``: after a first stop by the motion monitor, motion is allowed again when no
+        command has arrived for this time in s. After a second stop within 60 s, motion remains
         refused.
         """
         reason = "" if stands else self.reason(now, timeout_s)

@@ -103,9 +103,11 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        If the command cannot be encoded, the robot is stopped. The robot is also stopped if the
-        command was a standstill before, but is a motion with the new settings. The reason is that
-        this command was not checked as a motion.
+        The robot is stopped in two cases:
+
+        * The command cannot be encoded with the new settings.
+        * The command was a standstill, but is a motion with the new settings. It was never checked
+          as a motion.
         """
         current = self.policy.current
         if current is None:
@@ -265,9 +267,8 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only the loss of a goal gives a notice, because the user sends a goal only once. The loss of
-        a velocity command needs no notice, because the user sends such commands repeatedly: the
-        driver refuses the next one, and reports this.
+        Only the loss of a goal gives a notice. Velocity commands come repeatedly, so the driver
+        refuses the next one, and reports this.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)

@@ -22,9 +22,9 @@ PACE_S: Final = 0.01
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s. It is short enough for commands at 50 Hz.
 
-An even shorter time would be harmful on a line that loses bytes. The driver would send more
-set-points, so more of them would be damaged. The board would then obey wrong set-points for a
-larger part of the time (docs/internals/integrity.md).
+On a line that loses bytes, a shorter time would do harm: more set-points would be sent, so more
+would be damaged, and the board would obey wrong ones for a larger part of the time
+(docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest rate at which Stop and the emergency stop are repeated, in Hz."""
@@ -105,12 +105,11 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        The set-point in effect is sent again at once, for one of two reasons. If the packets are
-        Stop, they have ended the motion. If they are not Stop, the board may hold the beginning of
-        a motion frame whose last bytes were lost. It then takes the first bytes of the packets for
-        the lost ones, and obeys a wrong motion.
+        The set-point in effect is sent again at once:
 
-        There is one exception: after Stop, a zero set-point is not sent again.
+        * After Stop, because Stop has ended the motion. A zero set-point is not sent again.
+        * After other packets, because the last bytes of an earlier motion frame may be lost. The
+          board then takes the first bytes of the packets for them, and obeys a wrong motion.
         """
         if self._heard is not None:
             self._heard(packets, now)

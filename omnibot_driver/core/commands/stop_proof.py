@@ -38,9 +38,8 @@ PROOFS: Final = 2.0
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-The driver takes the period from the duration of the newest displacement. After a loss, a
-displacement also contains the motion of the lost displacements, and its duration is longer than the
-period. So a duration above ``RAREST_S`` is replaced by ``RAREST_S``.
+The driver takes the duration of the newest displacement for the period. After a loss, this duration
+also includes the lost displacements, so it is limited to ``RAREST_S``.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
@@ -50,12 +49,12 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether a standstill is proved. Two events prove it: the robot stood still for
-      ``still_s`` after Stop, or the board paused. The value becomes False when a motion command is
-      sent, when a measured displacement shows a motion, or when the proof is discarded (``begin``).
-    * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
-    * ``measured``: whether a measured displacement has arrived later than ``UNDER_WAY_S`` after
-      Stop.
+    ``proved``: whether a standstill is proved: the robot stood still for ``still_s`` after Stop, or
+    the board paused. A motion command, a measured motion or ``begin`` ends the proof.
+
+    ``owed``: whether a motion command was sent, and no standstill has been proved since then.
+
+    ``measured``: whether a measured displacement has arrived later than ``UNDER_WAY_S`` after Stop.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

@@ -2,8 +2,8 @@
 
 """Sends the motion lines (``rc``) to both boards, and repeats them.
 
-In two cases, the lines are also repeated after each new measured angle of the front wheel: if this
-angle limits the speed, or if the lines have no checksum.
+If the front wheel's angle limits the speed, or if the lines have no checksum, the lines are also
+repeated after each new measured angle.
 
 The module knows when a line is due; it does not know what the line contains.
 """

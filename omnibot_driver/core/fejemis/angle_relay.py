@@ -24,9 +24,9 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit in degrees for an angle that the board misreads.
 
-Damage on the line can remove the minus sign of an angle, and the checksum may not detect this. The
-board then reads an angle to the right as an angle to the left. The driver writes each angle in
-such a way that a misread angle is smaller than this limit.
+If damage on the line removes the minus sign of an angle, the checksum may not detect this, and the
+board reads an angle to the right as an angle to the left. The driver writes each angle so that a
+misread angle is below this limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -54,8 +54,8 @@ class AngleRelay:
 def heard_instead(text: str) -> Iterator[float]:
     """Yield each number that a board may read if two characters of ``text`` are lost unnoticed.
 
-    The checksum does not detect the loss of some pairs of characters. There is one number for each
-    of these pairs. If the characters that remain are not a number, this number is 0.
+    The checksum does not detect the loss of some pairs of characters. Each of these pairs gives one
+    number: the one that the remaining characters form, or 0 if they form none.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:

@@ -43,9 +43,8 @@ class FejemisDecoder:
 
     ``changed``: whether ``sums`` has changed. The caller resets this flag.
 
-    ``doubtful``: whether the last line that is not a heartbeat contradicts the heartbeats: either
-    only this line has a checksum, or only the heartbeats have one. This can be True only if the
-    user's setting is auto. While ``doubtful`` is True, the driver's lines to the board carry no
+    ``doubtful``: whether the last line that is not a heartbeat contradicts ``sums``; False unless
+    the user's setting is auto. While ``doubtful`` is True, the driver's lines to the board carry no
     checksum.
 
     ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.

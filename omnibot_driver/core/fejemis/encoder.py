@@ -84,10 +84,11 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        It is true in two cases. In the first case, the angle limits the speed, so the limit changes
-        with the angle. In the second case, the lines have no checksums, so a board may obey a
-        damaged line. The next angle comes after 15 ms, and the lines that follow it replace the
-        damaged line.
+        There are two reasons to do so:
+
+        * The angle limits the speed, so each new angle changes the limit.
+        * The lines have no checksums, so a board may obey a damaged line. The next angle comes
+          after 15 ms, and the lines that follow it replace the damaged line.
         """
         return self.held or not self._pair.with_sums
 
@@ -113,10 +114,9 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist of the robot's body that ``packets`` command.
 
-        The caller passes packets that were sent. For a motion, ``encode`` stores the packets and
-        the twist that it has computed for the front wheel's angle. If ``packets`` are equal to the
-        stored ones, the result is the stored twist. All other packets are regarded as a stop. Each
-        call deletes the stored packets, so they are used only once.
+        ``packets``: packets that were sent. If they are the packets of the last motion from
+        ``encode``, the result is the twist that ``encode`` computed for the front wheel's angle.
+        For other packets, and in a second call with the same packets, the result is a standstill.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -21,8 +21,8 @@ FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Tolerance, in degrees, for the change from the last accepted angle to a new one.
 
-The driver adds the angle by which the wheel can turn in the time between the two, at its highest
-speed (``FASTEST_DEGPS``). If the change is at most this sum, the new angle is accepted.
+The limit of the change is this tolerance, plus the angle by which the wheel can turn since the last
+accepted one at its highest speed (``FASTEST_DEGPS``).
 """
 BITS: Final = (
     (10, False, "broken Hall element"),
@@ -109,9 +109,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always accepted. A later angle is accepted in two cases. In the first
-        case, it is near the last accepted angle. In the second case, the previous angle was
-        rejected, and the new angle is near this rejected angle.
+        The first angle is always accepted. A later angle is accepted if it is near the last
+        accepted angle, or near a rejected angle that came directly before it.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -65,8 +65,7 @@ class Half:
     ``heard_at``: time in s of the last valid line.
 
     ``clocks``: the clocks of both boards from earlier connections, by identity. Both halves share
-    them. The boards may have exchanged their ports, so a half finds the clock of its board by the
-    identity.
+    them, because the boards may have exchanged their ports since then.
     """
 
     def __init__(self, line_sums: LineSums, clocks: dict[int, TeensyClock]) -> None:
@@ -123,9 +122,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        The caller must not collect the messages first. If a message shows a restart, the half
-        forgets all times of the board from before the restart. But the caller needs these times for
-        the messages that precede this message.
+        So the caller must not collect the messages first: a message that shows a restart deletes
+        the board's earlier times, and the caller needs these times for the messages before it.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

@@ -22,13 +22,12 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit for the time between the arrivals of two successive samples, in sampling periods.
 
-The driver uses this limit only if both samples seem to be late by about a period or more. There are
-two possible causes:
+The limit is used if both samples seem to be late by about a period or more. There are two possible
+causes:
 
-* An earlier sample was lost. Then both samples are on time, and arrive about one period apart. The
-  time between their arrivals is above the limit.
-* The host has stalled. Then both samples have waited, and are read shortly after one another. The
-  time between their arrivals is below the limit, and no sample was lost.
+* Above the limit, an earlier sample was lost. Both samples are on time, about one period apart.
+* Below the limit, the host has stalled. Both samples have waited, and were read shortly after one
+  another. No sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
@@ -37,8 +36,8 @@ BLOCK: Final = 100
 BLOCK_S: Final = 0.5
 """Shortest time in s in which the samples of a block arrive.
 
-After a stall, hundreds of samples arrive at once, and all of them are late. They must not be more
-than one block. Otherwise, there would be no block with a sample that was on time.
+After a stall, hundreds of late samples arrive at once. This time prevents that they fill a block
+alone: each block needs a sample that was on time.
 """
 EARLY_S: Final = 5e-4
 """If a sample seems early by more than this time, in s, fewer samples were lost before it than
@@ -135,9 +134,8 @@ class ImuSamples:
         ``delay_s``: time in s from the sample's sampling time, computed with the old phase, to its
         arrival.
 
-        The new phase is as late as possible. It must not be so late that a recent sample seems to
-        arrive before its sampling time. Recent samples are those of the last three blocks of 100
-        samples, and those that came after these blocks.
+        The new phase is the latest one with which no recent sample arrives before its sampling
+        time. Recent samples are those of the last three complete blocks, and those that came later.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

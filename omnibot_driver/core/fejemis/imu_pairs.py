@@ -2,9 +2,8 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-A pair is a gyro line and an acceleration line. A pair is false if its two lines belong to different
-samples. A false pair arises if the second line of one sample and the first line of the next sample
-were lost.
+A pair is a gyro line and an acceleration line. If the second line of one sample and the first line
+of the next are lost, the lines that remain form a false pair.
 """
 
 import itertools
@@ -30,10 +29,9 @@ limit or longer, the pair may be false, so the pair must wait for the next pose.
 SILENT_S: Final = 0.1
 """Longest usual time, in s, without gyro and acceleration lines.
 
-After a longer time, it is unknown whether the board sent nothing, or whether the host only read
-late. The next pose shows which of the two is true. Until then, each new pair must wait, even if its
-two lines come close together. If the board sent nothing, the sampling time of the pair is unknown,
-so the pair is rejected.
+After a longer time, either the board sent nothing, or the host read late. The next pose shows which
+is true, so each new pair waits for this pose, even if its two lines came close together. If the
+board sent nothing, the sampling time of the pair is unknown, and the pair is rejected.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver. During this time, every new pair must wait for the next
@@ -44,28 +42,26 @@ SUREST_S: Final = 0.05
 """Limits, in s, for the difference ``_evidence_s``, which shows which line of a sample comes first.
 
 The difference is the sum of the intervals before gyro lines, minus the sum of the intervals before
-acceleration lines. Each interval begins at the previous line of the other kind. The line that comes
-first has the longer intervals before it, because the interval between two samples is longer than
-the interval within a sample. So if the difference is positive, the gyro line comes first. If it is
-negative, the acceleration line comes first.
+acceleration lines. An interval begins at the previous line of the other kind, and is longer between
+two samples than within a sample. So if the difference is positive, the gyro line comes first. If it
+is negative, the acceleration line comes first.
 
-``KNOWN_S``: the sign of the difference is used only if its magnitude is at least this value.
+``KNOWN_S``: least magnitude of the difference at which its sign is used.
 
-``SUREST_S``: a larger magnitude is reduced to this value.
+``SUREST_S``: largest magnitude of the difference.
 """
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to an interval between a gyro and an acceleration line if a line of
-another kind arrives in it. Such an interval is probably between two samples, and with this time it
-is longer than an interval within a sample."""
+another kind arrives in it. Such an interval is probably between two samples; the added time makes
+it longer than any interval within a sample."""
 PATIENCE: Final = 60
 """Number of intervals after which the driver decides which line of a sample comes first, even if
 the magnitude of ``_evidence_s`` is still below ``KNOWN_S``. The magnitude stays small if the two
 lines are half a period apart: all intervals are then equally long."""
 MOST: Final = 10
-"""Largest magnitude of a counter in ``_outside``. Each kind of line has such a counter, except
-gyro and acceleration lines. A positive counter shows that lines of this kind usually come
-between two pairs. A negative counter shows that they usually come between the two lines of a
-pair."""
+"""Largest magnitude of a counter in ``_outside``. Each kind of line has a counter, except gyro and
+acceleration lines. A positive counter means that lines of this kind usually come between two pairs.
+A negative counter means that they usually come within a pair."""
 UNPOSED: Final = 20
 """Limit for the number of gyro lines, and of acceleration lines, since the last pose. If one of the
 two numbers exceeds the limit, a pair that still waits for the next pose is rejected."""
@@ -81,8 +77,8 @@ class Pair:
 
     ``skipped``: how many incomplete samples were left out since the previous pair.
 
-    ``doubtful``: whether the pair must wait for the next pose. It must wait if it may be false, or
-    if it came after a silence, or soon after a stall of the driver.
+    ``doubtful``: whether the pair must wait for the next pose: because it may be false, because it
+    came after a silence, or because it came soon after a stall of the driver.
 
     ``next_pose_s``: the board's time of the next pose, if this pose arrived before ``take``
     returned the pair.
@@ -153,11 +149,10 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line.
 
-        ``kind``: the keyword of the line.
+        If a pair waits for its second line, this second line is now regarded as lost. Exception:
+        lines of this ``kind`` usually come between the two lines of a pair.
 
-        A pair may still wait for its second line. Usually, this second line is then regarded as
-        lost. There is one exception: if lines of this ``kind`` usually come between the two lines
-        of a pair, the pair continues to wait.
+        ``kind``: the keyword of the line.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -172,10 +167,12 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all pairs that still wait.
 
-        The time since the previous pose shows how many lines of each kind the board has sent. If
-        both gyro and acceleration lines are missing, any of the waiting pairs may be false, so all
-        of them are rejected. They are also rejected if this time is unknown: at the first pose, and
-        at a pose whose time is before the time of the previous pose.
+        All of them are rejected in two cases:
+
+        * Since the previous pose, both gyro and acceleration lines are missing. Then any of the
+          pairs may be false.
+        * The time since the previous pose is unknown: at the first pose, and at a pose whose time
+          is before that of the previous pose.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S

@@ -288,10 +288,10 @@ class Jobs:
 def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    The board does not answer ``eer``, the command to load the configuration. So the driver then
-    sends a query: ``confi`` to the drive board, ``fwoi`` to the front board. An answer to this
-    query shows that the board receives lines. The answer "unhandled" counts too: it comes from a
-    front board that does not know ``fwoi``.
+    The board does not answer ``eer``, the command to load the configuration. An answer to the query
+    that follows (``confi`` to the drive board, ``fwoi`` to the front board) shows that the board
+    receives lines. The answer "unhandled" counts too: it comes from a front board that does not
+    know ``fwoi``.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

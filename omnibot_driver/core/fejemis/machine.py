@@ -2,9 +2,9 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-The board does not acknowledge these lines, so they are repeated. There is one exception: the line
-of a lift command is sent only once. If it is a command of 0 V and its line is lost, the lift still
-stops, because each line that moves the lift limits its run time.
+The board does not acknowledge these lines, so they are repeated. Exception: the line of a lift
+command is sent only once. If the line for 0 V is lost, the lift still stops, because each line that
+moves the lift limits the run time.
 """
 
 import math
@@ -167,10 +167,9 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    With some numbers in the line, the checksum would not detect damage to the line. The driver
-    avoids these numbers. So the sent voltage may be lower than ``volts``, but it is at least
-    ``LEAST_PART * volts``. Such a voltage exists for all ``volts`` from ``LEAST_VOLTS`` to
-    ``MOST_VOLTS``.
+    The line contains only numbers in which the checksum detects damage. So the sent voltage may be
+    lower than ``volts``, but it is at least ``LEAST_PART * volts``. Such a voltage exists for all
+    ``volts`` from ``LEAST_VOLTS`` to ``MOST_VOLTS``.
     """
     if not volts:
         return OFF[0], 0.0

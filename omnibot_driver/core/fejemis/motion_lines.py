@@ -2,10 +2,9 @@
 
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
-A line has a speed and a turn rate. The front board uses only their ratio. The drive board uses only
-the square root of the sum of their squares. So several lines command the same motion. The module
-considers the lines in which the checksum detects such a loss, and selects the line that is nearest
-to the command.
+A line has a speed and a turn rate. The front board uses only their ratio, the drive board only the
+square root of the sum of their squares. So several lines command the same motion. Of the lines in
+which the checksum detects such a loss, the module selects the one that is nearest to the command.
 """
 
 import math

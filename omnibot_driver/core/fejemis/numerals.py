@@ -2,12 +2,12 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-The checksum is the sum of a line's character codes, modulo 99. So it does not change if two
-characters are lost whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``,
-``-`` and ``6``. A line should not contain both characters of such a pair.
+The checksum is the sum of a line's character codes, modulo 99. It does not change if two characters
+are lost whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, ``-`` and
+``6``. So a line should not contain both characters of such a pair.
 
-Each motion line begins with ``rc 2``, so its numbers must not contain ``1``. Therefore, values
-between .0999 and .200, for example, cannot be sent.
+Each motion line begins with ``rc 2``, so its numbers must not contain ``1``. For example, values
+between .0999 and .200 cannot be sent.
 """
 
 from bisect import bisect_left, bisect_right
@@ -47,7 +47,8 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
     """Return the safe number that is nearest to a positive ``number``, with its text.
 
-    If any two characters of a safe number (``numerals``) are lost, the checksum detects this.
+    A safe number (``numerals``) is one in which the checksum detects the loss of any two
+    characters.
 
     ``down``: whether the result must not exceed ``number``. If all safe numbers exceed it, the
     smallest of them is returned.

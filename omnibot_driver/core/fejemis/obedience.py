@@ -2,8 +2,8 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-The driver sends ``stop`` for a pause, and for its own e-stop. After the release of the e-stop, the
-driver sends ``start`` by itself. After a pause, it sends ``start`` only if the user requests it.
+The driver sends ``stop`` for a pause and for its own e-stop. It sends ``start`` by itself when the
+e-stop is released, but after a pause only at the user's request.
 
 The module knows times and rcSource, the source of the commands that the board obeys; it does not
 know lines.

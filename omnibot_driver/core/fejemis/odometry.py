@@ -2,10 +2,10 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-Poses are coarse: they have steps of 1 mm. A step of 1 mm in 20 ms corresponds to 0.05 m/s. Wheel
-speeds are finer, but the motion that is summed up from them drifts away from the pose. Therefore,
-the driver usually computes a displacement from the wheel speeds, and corrects it towards the newest
-pose. Without recent wheel speeds, or if they clearly contradict the pose, the pose alone decides.
+Poses have steps of 1 mm; in 20 ms, such a step corresponds to 0.05 m/s. Wheel speeds are finer, but
+the motion that is summed up from them drifts away from the pose. So a displacement is computed from
+the wheel speeds, and corrected towards the newest pose. Without recent wheel speeds, or if they
+clearly contradict the pose, the pose alone decides.
 """
 
 import math
@@ -24,8 +24,8 @@ ROUNDINGS: Final = 1.5
 """Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
 in units of the poses' last digit.
 
-A displacement depends on two poses, and each of them can be wrong by half a unit. So the error
-along one axis is at most one unit. The errors along both axes add up, so the limit is higher.
+A displacement depends on two rounded poses, so its error along each axis is at most one unit. The
+limit is higher, because the errors along both axes add up.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
@@ -99,10 +99,10 @@ class PoseOdometry:
 
         The list is empty if there is no displacement (see the method ``pose``).
 
-        The list also contains a PoseReading every 0.2 s, after a restart of the board, and at the
-        beginning of a new coordinate frame. The PoseReading is the pose with which the coordinate
-        frame began, plus all displacements that were returned since then. If the driver rejects one
-        of these displacements in a later check, the PoseReading still contains it.
+        Every 0.2 s, after a restart of the board, and at the beginning of a new coordinate frame,
+        the list also contains a PoseReading. The PoseReading is the pose with which the frame
+        began, plus all displacements that were returned since then. Displacements that a later
+        check rejects are included.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

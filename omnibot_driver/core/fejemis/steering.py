@@ -29,8 +29,8 @@ turn on the spot may begin. Up to this deviation, other motion may have full spe
 GIVEN_RAD: Final = math.radians(5.0)
 """Permitted error of the body's velocity, given as a deviation of the front wheel in rad.
 
-It is the error that this deviation from the target angle causes at full speed. If the wheel
-deviates more, the driver lowers the speed, so that the error stays within the permitted one.
+At full speed, this deviation from the target angle causes exactly the permitted error. If the
+deviation is larger, the driver lowers the speed until the error is permitted.
 """
 
 

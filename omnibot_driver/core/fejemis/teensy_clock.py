@@ -32,18 +32,20 @@ AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """Tolerance in s within which implausible board times must agree to begin the clock anew.
 
-At least ``AGAIN`` such times in a row begin the clock anew if two conditions hold. From the first
-time to each of the others, the board time advances as much as the arrival time, within this
-tolerance. The last time arrives at least ``AGAIN_AFTER_S`` s after the first.
+At least ``AGAIN`` such times in a row begin the clock anew if two conditions hold:
 
-The times of lines that seem early must agree within the same tolerance.
+* From the first time to each of the others, the board's time and the arrival time advance by the
+  same amount, within this tolerance.
+* The last time arrives at least ``AGAIN_AFTER_S`` s after the first.
+
+The tolerance also applies to the times of lines that seem early.
 """
 EARLIES_WITHIN_S: Final = 1.0
 """Longest time in s for which a line that seems early is counted together with later such lines.
 
-A line seems early if it arrives earlier than the clock predicts. The reason: the clock began with a
-line that was late. After three (``AGAIN``) lines that seem early, the clock begins anew. Other
-lines may arrive between these three lines, because a late line does not seem early.
+A line seems early if it arrives earlier than the clock predicts. The cause is that the clock began
+with a late line. After three (``AGAIN``) lines that seem early, the clock begins anew. Late lines
+may arrive between these three.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -163,9 +165,8 @@ class TeensyClock:
 
         Return whether the clock has begun anew.
 
-        In fact, no line can arrive early. But the clock may have begun with a line that had waited
-        for the host. Then lines that did not wait seem early. If the clock never began anew, the
-        driver might reject such lines for ever.
+        A line seems early if the clock began with a line that had waited for the host. If the clock
+        did not begin anew, the driver might reject all lines that did not wait.
         """
         agree = all(
             before_s < board_s
@@ -189,9 +190,8 @@ class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
     The class is a ``ReadingClock``, the interface that gives readings their timestamps. Two
-    timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. To ensure this
-    difference, a timestamp may be later than the time of the call. In all other cases, a timestamp
-    is not later than the call.
+    timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. Only to keep this
+    difference, a timestamp may be later than the time of the call.
     """
 
     skew_ppm = 0.0

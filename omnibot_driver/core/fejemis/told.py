@@ -2,8 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-Some notices make the driver stop the robot. Such a notice is passed on each time, so that the robot
-stops each time. If its text was already shown in the last 10 s, the notice has an empty text.
+A notice that stops the robot is passed on each time, so that the robot stops each time. If its text
+was shown in the last 10 s, the notice has an empty text.
 """
 
 import math

@@ -27,9 +27,8 @@ user that the silent board is missing.
 UNREAD_S: Final = 0.03
 """Longest time in s for which the driver normally reads no line of either board.
 
-Each board sends at least every 15 ms. If the driver has read nothing for a longer time, it has read
-late, or the connection to both boards is interrupted. So the driver does not blame one of the
-boards for the missing data.
+Each board sends at least every 15 ms. After a longer time, the driver has read late, or both boards
+are disconnected, so no single board is blamed for the missing data.
 """
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
@@ -136,9 +135,8 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, the driver may be late, and the boards' data may wait to be read. The driver reads
-        this data during the next ``OLDEST_S``. In this time, it does not blame one of the boards
-        for missing data.
+        If so, the driver may be late, and the boards' data may wait to be read. Neither board is
+        blamed for missing data in the next ``OLDEST_S``, in which the driver reads this data.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

@@ -45,10 +45,10 @@ RESET_AGAIN_S: Final = 1.1
 
 It is long enough for stopped wheels to come to rest, and for four tick reports to arrive.
 
-After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. But it must not
-accept small counts that stay the same although a reset would set them to zero, because they show
-that the board has not obeyed. So with such counts, each repetition restarts ``UNPROVED_S``. After
-the last repetition, the driver gives the reset up before ``UNPROVED_S`` has passed.
+After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. But small counts
+that stay the same, although a reset would set them to zero, show that the board has not obeyed.
+With such counts, each repetition restarts ``UNPROVED_S``. After the last repetition, the driver
+gives the reset up before ``UNPROVED_S`` has passed.
 """
 STEADY_S: Final = 0.3
 """Time in s. If the tick counts do not change for this time, the wheels are regarded as at rest.

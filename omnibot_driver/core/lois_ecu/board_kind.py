@@ -19,9 +19,9 @@ from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 LONE_TICKS: Final = 2
 """Number of tick reports after which an odometry report can show the kind of the board.
 
-An odometry report with its own command byte (0x20) shows that the board works as in the manual. The
-report shows nothing if the board has already sent an odometry report with the command byte of a
-tick report (0x12), or if the driver has found that the board counts ticks only forward.
+An odometry report with its own command byte (0x20) shows that the board works as in the manual. It
+shows nothing if the board has sent one with the command byte of a tick report (0x12) before, or if
+the driver has found that the board counts ticks only forward.
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
@@ -69,9 +69,9 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        The method adds up how far wheels that are commanded backward roll backward, as the board's
-        odometry shows. If the sum exceeds ``UNCOUNTED_M``, and no count has ever decreased, the
-        board counts only forward.
+        The driver adds up how far wheels that are commanded backward roll backward by the board's
+        odometry. If the sum exceeds ``UNCOUNTED_M`` and no count has ever decreased, the board
+        counts only forward.
 
         ``told``: changes in the board's odometry since the previous odometry report; None if
         unknown.

@@ -56,12 +56,9 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """How far the board's clock has fallen behind since the first tick report, in s.
-
-        This is the change of the arrival time minus the board's time. The list has two estimates of
-        it. The first one assumes that the board's clock always runs. The second one assumes that
-        this clock stops while the board sends.
-        """
+        """How far the board's clock has fallen behind since the first tick report, in s: the change
+        of the arrival time minus the change of the board's time. First value: if the board's clock
+        always runs. Second value: if it stops while the board sends."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -90,10 +87,10 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s, and whether this delay is irregular.
 
-        The delay is computed with the fitted clock. It is negative if the report is earlier than
-        this clock says. A delay is irregular if a late read cannot explain it: if it is clearly
-        negative, or much larger than all recent delays. Return 0 and False while too few reports
-        are stored. This method does not store the report.
+        The delay is relative to the fitted clock; a negative delay means that the report came
+        early. A delay is irregular if a late read cannot explain it: it is clearly negative, or
+        much larger than all recent delays. While too few reports are stored, return 0 and False.
+        This method does not store the report.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -36,8 +36,8 @@ class Coasting:
     def unsure_mps(self, now: float, step_s: float) -> float:
         """Return the standard deviation of the speed at ``now``, with the sign of the speed.
 
-        It is half the difference between the speeds of two wheels. One wheel loses its power at
-        once and decelerates fast. The other one loses it after ``step_s``, the whole period of the
+        It is half the difference between the speeds of two assumed wheels. One loses its power at
+        once and decelerates fast. The other one loses its power after ``step_s``, the period of the
         speed controller, and decelerates slowly.
         """
         age_s = now - self.heard_s

@@ -69,9 +69,9 @@ SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's x, and of its y, after a wheel has rolled 1 m at an
 oscillating speed. The error of the wheel's own distance (``SWINGING_M``) is separate."""
 LOST_PART: Final = (0.15, 0.35)
-"""Lost reports cause an error in a wheel's distance. These are its standard deviations, as
-fractions of the distance that the wheel rolls while reports are lost. First value: at a steady
-speed. Second value: at an oscillating speed. Only a wheel without counted ticks has this error."""
+"""Standard deviations of the error in a wheel's distance that lost reports cause, as fractions of
+the distance that the wheel rolls while reports are lost. First value: at a steady speed. Second
+value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
 """The board's odometry (0x20) corrects a wheel's distance. If it corrects more than

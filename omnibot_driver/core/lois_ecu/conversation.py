@@ -239,8 +239,8 @@ class LoisConversation:
         Called at the time ``wake_at``.
 
         ``proved``: whether displacements have proved that the robot stands still. A change of mode
-        that needs a standstill waits for this proof. After the driver has sent Stop for 2 s, it
-        changes the mode without the proof: in a terminal mode, the board sends no displacements.
+        that needs a standstill waits for this proof. After 2 s of Stop, the mode is changed without
+        the proof: in a terminal mode, the board sends no displacements.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal

@@ -110,9 +110,9 @@ class LoisDecoder:
     def feed(self, data: bytes, now: float) -> list[Report]:
         """Return the reports that ``data`` completes, in the order in which the board sent them.
 
-        A report may consist of several lines. So a report that may be complete is held back until
-        the next line shows its end. If ``data`` is empty and no line has come for long enough,
-        return the report that is held back.
+        A report of several lines may be complete before the driver knows its end. Such a report is
+        held back until the next line. With empty ``data``, it is returned if no line has come for
+        long enough.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))

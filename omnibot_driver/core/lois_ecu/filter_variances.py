@@ -29,9 +29,9 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: standard deviation of the speed of the left and right wheel because it is
-    unknown when and how fast they decelerate. Both wheels have the same error of the time, so the
-    sign says in which direction a wheel rolls.
+    ``coasting_mps``: for the left and right wheel, the standard deviation of the speed, because it
+    is unknown when and how fast the wheel decelerates. The sign gives the direction in which the
+    wheel rolls: the error of the time is the same for both wheels.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

@@ -39,9 +39,8 @@ LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
 """Factor for the longest allowed time between two lines of a group.
 
-The factor is multiplied by an interval: the time from the previous marker line with the same
-command byte to the marker line of this group. The result is limited to the range from ``QUIET_S``
-to ``LATE_S``.
+This time is the factor times the time between the marker lines of this group and of the previous
+group with the same command byte, but at least ``QUIET_S`` and at most ``LATE_S``.
 """
 
 # Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the

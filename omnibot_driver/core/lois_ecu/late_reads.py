@@ -23,10 +23,9 @@ reports arrive together, they were read late, and their times are corrected. ``B
 shorter delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor, a little above 1, for the computed time between two reports. If every read is late, all
-times are computed from the board's clock. The rate of this clock is not known exactly, so the
-computed times could fall behind the arrival times more and more. The factor reduces this difference
-again."""
+"""Factor, a little above 1, for the time between two reports that is computed from the board's
+clock. The rate of this clock is not known exactly. If every read is late, the computed times could
+fall behind the arrival times more and more; the factor prevents this."""
 
 
 @value(frozen=True, slots=True)
@@ -67,7 +66,7 @@ class LateReads:
         * ``unit``: the unit of the board's clock; None if it is unknown at present.
 
         If a clock in ns is near zero, either it has wrapped or the board has restarted. The clock
-        does not show which of the two has happened, so the arrival times are returned.
+        does not show which, so the arrival times are returned.
         """
         self._unit = unit or self._unit
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]

@@ -33,9 +33,9 @@ FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses.
 
-The odometry misses motion of a wheel that is faster than ``FAST_TICKS_PER_S``. While the board
-sends data, it notices a tick late. If the next tick comes soon after the late one, the board does
-not measure the speed between them. The odometry then lacks this motion.
+The odometry misses motion of a wheel that is faster than ``FAST_TICKS_PER_S``: while the board
+sends data, it notices a tick late. If the next tick follows soon, the board does not measure the
+speed between the two ticks, so the odometry lacks this motion.
 """
 
 

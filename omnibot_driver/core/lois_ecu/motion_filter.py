@@ -97,12 +97,11 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest expected difference between the two measured wheel speeds, in m/s.
+        """Smallest expected difference between the two measured wheel speeds, in m/s, since the
+        board's reported distance was last compared with the estimated one.
 
-        It is the minimum since the last comparison of the distance that the board reports with the
-        estimated distance. While both speeds are equal, the public firmware does not change the
-        reported position. The difference shows whether this may have happened since the last
-        comparison.
+        While both speeds are equal, the public firmware does not change the reported position. So a
+        small value shows that this may have happened.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)

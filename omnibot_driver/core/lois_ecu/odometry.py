@@ -33,16 +33,16 @@ UNHEARD_GROUPS: Final = 3
 tick reports, but at least ``UNHEARD_S`` seconds. The last report can be a tick report or an
 odometry report."""
 LOST_REPORTS_S: Final = 1.2
-"""Limit in s for the duration of a silence of the board. The driver uses it to decide what happened
-in the silence. If the silence was shorter and no set-point changed in it, the driver assumes that
-the wheels followed their set-points, and that only the reports were lost."""
+"""Limit in s for the duration of a silence of the board. If the silence was shorter and no
+set-point changed in it, the driver assumes that only the reports were lost, and that the wheels
+followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
-"""Largest tick count, in turns of the wheel, that the driver takes for a sign of a restart while
-the robot is at rest. After a restart of the board, the counts begin at zero. A larger count may
-come from a push of the robot. The limit is at least one tick."""
+"""Largest tick count, in turns of the wheel, that is a sign of a restart of the board while the
+robot is at rest. A restart begins the counts at zero; a larger count may come from a push of the
+robot. The limit is at least one tick."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -60,10 +60,10 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. One read can contain ticks, which
-        give an estimate, and then an odometry report, which corrects the motion before this
-        estimate. This correction needs the wheels' ``blind`` flags. So the flags are cleared only
-        when time passes."""
+        """Whether no time has passed since the last estimate. If one read contains ticks and then
+        an odometry report, the ticks give an estimate, and the report corrects the motion before
+        this estimate. The correction needs the wheels' ``blind`` flags, so these flags are cleared
+        only when time passes."""
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -154,9 +154,9 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether a restart of the board is the only explanation for counts near zero.
 
-        It is the only explanation if the counts differ from the predicted counts by more than the
-        wheels can have rolled. If the robot is at rest, there is a second condition: the counts
-        must be very small, because larger counts may come from a push.
+        The counts must differ from the predicted counts by more than the wheels can have rolled. If
+        the robot is at rest, they must also be very small, because larger counts may come from a
+        push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -170,10 +170,9 @@ class LoisOdometry:
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
         """Add an error to each wheel's distance, because the board may have restarted unnoticed.
 
-        The error of a wheel is the difference between its reported and its expected tick count.
-        This difference has two possible causes, and the driver does not know which one is true.
-        Either the board has restarted, and its counts have begun at zero, or the wheel has really
-        moved by the difference.
+        The error is the difference between the wheel's reported and expected tick count. The driver
+        does not know the cause of this difference: either the board has restarted and counts from
+        zero, or the wheel has really moved.
 
         ``late_s``: how much later than usual the ticks arrived.
         """

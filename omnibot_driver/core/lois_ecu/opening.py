@@ -41,8 +41,8 @@ commands nor settings: for example, a command for the LED. The time between two 
 longer, so the driver can send a side command between them."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 """Delays in s from a tick report to the next round of settings, and from a report of any kind to a
-request for a date. The driver uses the delays in turn, because the board cannot receive while it
-sends: with one constant delay, every round could arrive while the board sends."""
+request for a date. The driver uses the delays in turn: the board cannot receive while it sends, and
+with a constant delay, it could be sending at every round."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
@@ -111,10 +111,10 @@ class SettingsWriter:
     def _waits(self) -> bool:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
-        It must wait if the robot drives, and ``ROUNDS`` rounds have already been written. More
-        rounds would disturb the drive, because a written gain resets the controller of a wheel. But
-        a round that has begun is completed: the terminal mode at its beginning overwrites the left
-        short correction, which follows in the same round.
+        While the robot drives, at most ``ROUNDS`` rounds are written, because each written gain
+        resets the controller of a wheel. But a round that has begun is completed: the terminal mode
+        at its beginning overwrites the left short correction, which a later line of the round
+        writes again.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
@@ -243,14 +243,12 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round, in an order that changes from round to round.
 
-        The order changes because the board receives nothing while it sends. A board may send one
-        report in each round, always at the same time. If the order were constant, this board could
-        miss the same line in each round.
+        The board receives nothing while it sends. With a constant order, a board that sends a
+        report at the same time in each round could miss the same line each time.
 
-        The request for a date comes last. The board answers it at once, and receives nothing while
-        it sends the answer. So it would miss a setting that follows the request directly. The
-        pauses between the lines do not prevent this, because a busy computer may write all lines of
-        a round together.
+        The request for a date comes last. The board answers it at once, and would miss a setting
+        that follows directly. Pauses between the lines do not prevent this, because a busy computer
+        may write all lines of a round together.
         """
         rest = list(self.commands())
         place = rounds * len(rest) // ROUNDS % len(rest)

@@ -82,9 +82,9 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance that was added wrongly.
 
-        Usually, this is the distance since the wheel's reported speed last changed. There is one
-        exception: after this change, the driver may have sent a command to start, which the wheel
-        did not obey. Then it is the distance since that command.
+        Usually, the distance since the wheel's reported speed last changed is wrong. If the driver
+        has since sent a command to start that the wheel did not obey, only the distance since this
+        command is wrong.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -178,11 +178,10 @@ class ReportedSpeed:
     def _doubt_rolling(self, chance: float) -> None:
         """Add an error to the distance of a wheel that is estimated as rolling, but may be at rest.
 
-        If the wheel is at rest, the whole distance that was added since its reported speed last
-        changed is wrong. This distance grows with each report. So the errors of successive reports
-        are not independent: together, their standard deviation is ``chance`` times this distance.
-        The board's odometry (0x20) does not show the error, because the board also computes with
-        the old speed.
+        If the wheel is at rest, the whole distance since its reported speed last changed is wrong.
+        The standard deviation of this error is ``chance`` times the distance; the errors of
+        successive reports are not independent. The board's odometry (0x20) does not show the error,
+        because the board also computes with the old speed.
 
         ``chance``: probability that the wheel is at rest.
         """

@@ -26,8 +26,8 @@ least this distance, and is then near zero."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
 """``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count that can prove the
-reset of a robot at rest. The reset is proved if a count was at least this large before the reset,
-and both counts are zero afterwards. A smaller change may come from the backlash of the gears."""
+reset of a robot at rest. The reset is proved if a count was at least this large before, and both
+counts are zero afterwards. A smaller change may come from the backlash of the gears."""
 UNPROVED_S: Final = 2.5
 """Time in s for which the driver waits for a proof. After this time, it accepts counts near zero
 without a proof. The reason: if the counts were already near zero before the reset, no proof is
@@ -54,9 +54,8 @@ class ResetProof:
         """Record that the driver repeats the reset.
 
         ``before``: the counts at the time of the repetition. They replace the earlier counts only
-        if they can prove the reset. For this, two conditions must be true: the wheels are at rest
-        (``steady``), and the larger count reaches the limit of ``STEADY_TURNS`` and
-        ``STEADY_TICKS``.
+        if they can prove the reset: the wheels are at rest (``steady``), and the larger count
+        reaches the limit of ``STEADY_TURNS`` and ``STEADY_TICKS``.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

@@ -27,9 +27,9 @@ LOST_S: Final = 0.25
 """Limit in s for the mean time between the last ``LOST_REPORTS`` reports. Above this limit, reports
 were lost, or the board rarely sends reports. Late reads hardly change the mean of four reports."""
 REPORT_S: Final = 0.2
-"""Usual longest time in s between two reports. This module forgets speeds that are older than
-``WITHIN_S`` by its own clock. While reports are lost, each report advances this clock by at most
-``REPORT_S``. So the module still knows the speeds that were reported before a gap."""
+"""Usual longest time in s between two reports. This module forgets speeds after ``WITHIN_S`` by its
+own clock. While reports are lost, each report advances this clock by at most ``REPORT_S``, so the
+speeds from before a gap are not forgotten."""
 HIDDEN_PART: Final = 0.3
 """Speed of this module's clock, as a fraction of real time, while the board does not report the
 wheel's speed. Because of the slow clock, the module keeps the speeds from before this time for

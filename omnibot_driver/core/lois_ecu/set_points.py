@@ -28,8 +28,8 @@ class SetPoints:
     ``saturated``: number of commands that were slowed, because a value was above its limit.
 
     ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-    none was sent. The driver sends RPM 0/0 ``CLEAR_AFTER_S`` later. If RPM 0/0 must be repeated,
-    ``clears`` sets ``stopped_at_s`` to a later time.
+    none was sent. RPM 0/0 is sent ``CLEAR_AFTER_S`` after this time. If RPM 0/0 must be repeated,
+    ``clears`` sets a later time.
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 

@@ -2,9 +2,8 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-The robot's path is computed again for each error, once with a positive and once with a negative
-error. These copies of the path end in different poses, and the spread of these poses is the
-covariance.
+For each error, the robot's path is computed again with the positive and with the negative error.
+The covariance is the spread of the poses in which these paths end.
 
 Input: distances of the wheels; output: covariance of x, y and yaw.
 """

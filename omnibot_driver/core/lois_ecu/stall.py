@@ -37,11 +37,10 @@ regarded as similar."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
-"""Smallest number of reports without motion after which a wheel is regarded as stalled.
-``AT_LEAST`` is for a wheel that is commanded forward, ``AT_LEAST_BACKWARD`` for a wheel that is
-commanded backward. The numbers prevent a false alarm on a bad line, where few reports arrive. The
-number for backward is larger, because a stall backward may show only as an unchanged speed. A wheel
-that rolls steadily can also report an unchanged speed a few times."""
+"""``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion after which a
+wheel that is commanded forward or backward is regarded as stalled. The numbers prevent a false
+alarm on a bad line, where few reports arrive. The number for backward is larger: such a stall may
+show only as an unchanged speed, which a wheel that rolls steadily can also report a few times."""
 
 
 class StallWatch:
@@ -59,9 +58,9 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.may_roll = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of reports without motion. It is set to zero when the wheel turns,
-        when a command starts or reverses the wheel, and when ``stalled`` returns any wheel as
-        stalled. A report is counted only if it could have shown a motion of the wheel."""
+        """For each wheel: number of reports without motion; a report counts only if it could have
+        shown a motion. The number is set to zero when the wheel turns, when a command starts or
+        reverses it, and when ``stalled`` returns any wheel as stalled."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None

@@ -114,10 +114,9 @@ class ModeChange:
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
         """Return the command to send now to stop the robot before a change, or None.
 
-        First, the driver sends Stop. When it sees the robot at rest, or after ``UNPROVED_S``, it
-        sends RPM 0/0 instead, which clears the board's RPM target. This is necessary because of the
-        public firmware: while the RPM target is positive, the firmware counts backward motion by
-        duty as forward motion.
+        The command is Stop until the robot is at rest, but at most for ``UNPROVED_S``. Then it is
+        RPM 0/0, which clears the board's RPM target. While this target is positive, the public
+        firmware counts backward motion by duty as forward motion.
 
         ``stands``: whether the robot is seen at rest.
 

@@ -49,26 +49,24 @@ RESTARTED_TICKS: Final = 2
 RESTARTED_TURNS_PER_S: Final = 1.0
 """The largest plausible decrease of a wheel's count from one tick report to the next.
 
-A wheel that rolls back decreases its count. In ``duration`` seconds, it can roll back by
-``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, plus ``RESTARTED_TICKS`` ticks. If a
-count decreases by more than this, the board has restarted.
+In ``duration`` seconds, a wheel can roll back by ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S *
+duration`` turns, plus ``RESTARTED_TICKS`` ticks. If a count decreases by more than this, the board
+has restarted.
 """
 SILENT_S: Final = 1.0
 """Limit, in s, for the time without tick reports, used to detect a restart of the board.
 
-If the counts are near zero and the clock is irregular, there are two explanations: the board has
-restarted, or the wheels have rolled back. If the time without tick reports is above the limit, the
-driver assumes a restart.
+Counts near zero and an irregular clock show that the board has restarted, or that the wheels have
+rolled back. After a longer time than the limit, the driver assumes a restart.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Limit, in s, that is used if the clock does not confirm the time since the last tick report.
+"""Limit, in s, for the time since the last tick report, if the board's clock does not confirm it.
 
 To detect a restart, the driver computes how far the wheels may have rolled back since the last tick
-report. Usually it computes with the whole time since that report. But if the unit of the board's
-clock has just become unknown, the clock does not confirm this time. In this case, the driver
-computes with this limit if the time is longer.
+report. If the unit of the board's clock has just become unknown, the driver computes with at most
+this limit.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s, from the first counts after a reset, in which counts may still be from before the
@@ -199,11 +197,9 @@ class Translation:
     def _was_reset(self, ticks: Ticks, read_s: float) -> bool:
         """Return whether the board may have obeyed a reset since the last report of ticks.
 
-        The result is True if a reset was sent, and if a count is now nearer to zero than in the
-        last report.
+        This is so if a reset was sent, and a count is nearer to zero than in the last report.
 
-        ``read_s``: time of the read in s. Unlike the report's time, it is not corrected for a late
-        read.
+        ``read_s``: time of the read in s, without a correction for a late read.
         """
         before, until_s = self._ticks, self._reset_until_s
         if until_s is None:
@@ -256,9 +252,12 @@ class Translation:
     def _may_be_new(self, ticks: Ticks, fallen: int, duration_s: float, now: float) -> bool:
         """Return whether counts that have decreased fast can be those of a restarted board.
 
-        They cannot if they are larger than a wheel can roll in ``duration_s``. While the reports
-        show a clock in ns and counts of both wheels, they also cannot if the expected motion
-        explains them: in duty mode, wheels may roll back faster than ``RESTARTED_TURNS_PER_S``.
+        The result is False in two cases:
+
+        * The counts are larger than a wheel can roll in ``duration_s``.
+        * The expected motion explains the counts: in duty mode, wheels may roll back faster than
+          ``RESTARTED_TURNS_PER_S``. This is checked only while the reports show a clock in ns and
+          counts of both wheels.
 
         ``fallen``: the larger decrease of a count.
         """
@@ -274,13 +273,12 @@ class Translation:
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
         """Return the time in s since the board's start; None if it is unknown.
 
-        The caller assumes that the board was started after the previous report. The board's clock
-        begins at zero at the start, so the time since the start is the clock's value. It is unknown
-        if the clock's unit is unknown.
+        The caller assumes that the board has started after the previous report. The clock begins at
+        zero at the start, so its value is the result.
 
-        A clock in ns also begins at zero again every 4.3 s. Its value is used only if two
-        conditions hold: the previous report is less than 4.3 s old, and the value is not larger
-        than the age of that report.
+        The result is None if the unit of the clock is unknown. A clock in ns also begins at zero
+        every 4.3 s, so its value is used only if the previous report is less than 4.3 s old, and
+        the value is not larger than the age of this report.
 
         ``ticks``: the new report. ``duration_s``: time in s since the previous report.
         """
@@ -297,10 +295,10 @@ class Translation:
         This method is called if the counts and the clock may have begun at zero again. A small
         clock value alone proves nothing, because a clock in ns begins at zero every 4.3 s.
 
-        A restart is proved if two conditions hold: the clock does not fit the earlier reports, and
-        rolling wheels do not explain the counts. If no ticks came for more than ``SILENT_S``, the
-        first condition is enough. Without a proof, a restart is still possible, so the uncertainty
-        of the odometry is increased.
+        A restart is proved if the clock does not fit the earlier reports, and rolling wheels do not
+        explain the counts. If no ticks came for more than ``SILENT_S``, the clock alone proves it.
+        Without a proof, the uncertainty of the odometry is increased, because a restart is still
+        possible.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)

@@ -41,8 +41,8 @@ class WheelModel:
 
     ``kind``, ``target_mps``: the command that the motor follows now.
 
-    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. In duty mode, the motor does
-    not follow this target, but the firmware keeps it and counts ticks only while it is positive. A
+    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. The firmware keeps it in duty
+    mode, although the motor does not follow it, and counts ticks only while it is positive. A
     negative duty lowers it with each tick.
     """
 

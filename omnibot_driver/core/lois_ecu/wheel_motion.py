@@ -51,10 +51,9 @@ ROLLED_OUT_S: Final = 1.0
 UNSETTLED_S: Final = (0.27, 0.06)
 """Factor in s for the uncertainty of a wheel's distance after an early halt.
 
-A halt is early if it comes soon after a new set-point. The wheel has then not yet reached the speed
-that the filter assumed, so its distance is uncertain. The standard deviation of the distance in m
-is this factor, multiplied by ``unsettled_mps``. The first factor is for the board's own gains, the
-second one for gains that the user has set.
+A halt is early if it comes so soon after a new set-point that the wheel has not reached the speed
+that the filter assumed. The standard deviation of the distance in m is this factor, multiplied by
+``unsettled_mps``. First value: for the board's own gains. Second value: for the user's gains.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -101,10 +100,10 @@ class Wheel:
         self.rolled_to_m = 0.0
         """Distance in m that the wheel had rolled when its motion was last certain.
 
-        The value is set when a new measured speed arrives, when the board restarts, and when the
-        controller is reset. It is also set when a command starts a wheel whose target was zero. If
-        the driver finds out later that the wheel has been at rest since then, it subtracts the
-        distance that it has added since then.
+        The motion is certain when a new measured speed arrives, when the board restarts, when the
+        controller is reset, and when a command starts a wheel whose target was zero. If the wheel
+        proves to have been at rest since then, the driver subtracts the distance that it has added
+        meanwhile.
         """
         self.begin_again()
 
