@@ -22,8 +22,8 @@ def write_whole(
 
     ``write``: function that writes the content to the open file. Line ends are not converted.
 
-    ``wanted``: function that is called after the content is written. If it returns False, the new
-    content is discarded, and an existing file stays as it was. The result is then False.
+    ``wanted``: function that is called after the content is written. If it returns False, the file
+    is not written, and an existing file stays as it was.
     """
     import tempfile  # takes 1 MB, and few drivers ever write a file
 

@@ -91,12 +91,12 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 def speak(last_words: Words, until: list[int], drop: bool) -> None:
     """Write the packets of the stop command ``last_words`` to their lines, 20 times.
 
-    ``until``: descriptors on which the driver sends. Input on one of them shows that the driver
-    runs again, and can stop the robot itself. So the function ends early if there is input. It also
-    ends early if all lines are lost.
+    End early if all lines are lost, or if the driver runs again and can stop the robot itself.
 
-    ``drop``: whether to discard, at the beginning, the driver's output that the lines have not sent
-    yet.
+    ``until``: descriptors on which the driver sends. Input on one of them shows that the driver
+    runs again.
+
+    ``drop``: whether to discard first the driver's output that the lines have not sent yet.
     """
     lines = {line for line, _ in last_words}
     for line in lines if drop else ():

@@ -68,8 +68,8 @@ class Keeper:
     def beat(self, now: float, *, latched: bool = False) -> str:
         """Send the guard a heartbeat. Call this method every 0.1 s, neither more nor less often.
 
-        Returns a sentence for the user when a guard fails for the first time, and when a guard
-        cannot be started for the first time. Otherwise returns an empty text.
+        Returns a sentence for the user at the first failure of a guard, and at the first failure to
+        start one. Otherwise returns an empty text.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -97,11 +97,11 @@ class Keeper:
     def end(self, *, stopped: bool, written: bool = False) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        * ``stopped``: whether the robot is already stopped. If it is False, the guard sends its
-          stop command before it ends.
-        * ``written``: whether the driver could write its last packets to the port. If both values
-          are False, the guard first discards the kernel's output, where old motion commands may
-          wait.
+        * ``stopped``: whether the robot is already stopped. If not, the guard sends its stop
+          command before it ends.
+        * ``written``: whether the driver could write its last packets to the port. If not, the
+          guard discards the kernel's output before its stop command: old motion commands may wait
+          there.
         """
         self._restart_at = math.inf
         if stopped:

@@ -43,9 +43,9 @@ the shutdown.
 SILENCE_S: Final = 0.25
 """Longest wait at shutdown, in s, for the second proof that the robot is at rest.
 
-After the first proof, the driver sends nothing more, and waits for the second proof. The second
-proof shows that the last Stop had no bad effect: a Stop that the line has damaged might move the
-robot. For a slow board, the driver waits longer.
+After the first proof, the driver sends nothing more. A last Stop that the line has damaged might
+move the robot; the second proof shows that this has not happened. For a slow board, the driver
+waits longer.
 """
 BOTH_PROOFS_S: Final = 2.4
 """Longest time for both proofs at shutdown together, in s, even for a slow board.

@@ -254,8 +254,8 @@ class Publishing:
     def _is_news(self, text: str) -> bool:
         """Return whether this text is new since the last change of state. Remember the text.
 
-        A change to disconnected or connecting does not count as a change. So each text is logged
-        only once if a port is lost repeatedly and the board sends no valid data in between.
+        A change to disconnected or connecting does not count. So if a port is lost repeatedly, each
+        text is logged only once until the board sends valid data.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

@@ -106,10 +106,9 @@ class SharedSession:
         * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
           the motion interlock must know that the sender is still active.
 
-        Raises CommandRefused if ``action`` refuses the command. Also raises CommandRefused if the
-        command may have been sent before or during a recent stall of this process. In both cases,
-        the function ``refused`` is called with the reason. There is one exception: if too many
-        events wait for delivery, ``refused`` is not called.
+        Raises CommandRefused if ``action`` refuses the command, or if the command may have been
+        sent before or during a recent stall of this process. The function ``refused`` is then
+        called with the reason, except if too many events wait for delivery.
         """
         try:
             with self.lock:

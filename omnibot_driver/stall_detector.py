@@ -19,8 +19,8 @@ in which the guard stops the robot.
 SETTLE_S: Final = 0.25
 """Time in s for which the driver still refuses commands after the end of a stall.
 
-The reason: the driver knows the sender's clock only roughly. So the stamp of a command that was
-sent during the stall may be a little later than the end of the stall.
+The driver knows the sender's clock only roughly. So a command that was sent during the stall may
+have a stamp that is a little later than the end of the stall.
 """
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.

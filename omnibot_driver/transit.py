@@ -31,9 +31,11 @@ LASTING_DRIFT: Final = 1e-4
 crystals. The correction by NTP is assumed to add at most ``LARGEST_CORRECTION_S``, in s. It steps
 the clock if the error is larger."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor for the misfit (``_Sender.misfit_s``) of a message that is too early for a sender. A
-message that is 1 s too early fits as badly as a message that is 10 s too late. A message is
-assigned to the sender that it fits best."""
+"""Factor for the misfit (``_Sender.misfit_s``) of a message that is too early for a sender.
+
+A message that is 1 s too early fits as badly as a message that is 10 s too late. A message is
+assigned to the sender that it fits best.
+"""
 ALIKE_S: Final = 0.02
 """Largest difference in s between the misfits (``_Sender.misfit_s``) of two senders that fit a
 message equally well. Of these two, the driver assumes the sender whose last message had the higher
@@ -73,7 +75,6 @@ class Delay:
     * ``waited_s``: part of this time in our own queue.
     * ``sent_ns``: time of sending by our clock. While the offset of the sender's clock is unknown,
       there are two possible times: the estimated time, and the time by the sender's own clock.
-      Later, there is only the estimated time.
     """
 
     total_s: float
@@ -169,10 +170,9 @@ class _Sender:
     def misfit_s(self, differences_s: Differences, at_s: float) -> tuple[float, float]:
         """Return the smallest and the largest possible misfit of a message to this sender, in s.
 
-        The misfit says how badly the time of the message fits this sender; 0 fits exactly. If the
-        message is too late, the misfit is the time by which it is too late. If the message is too
-        early, the misfit is ten times (``CLOCK_RETREATS``) the time by which it is too early. The
-        clocks drift by an unknown amount, so only a smallest and a largest misfit are known.
+        The misfit is the time by which the message is too late, or ten times (``CLOCK_RETREATS``)
+        the time by which it is too early. The clocks drift by an unknown amount, so only limits of
+        the misfit are known.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)

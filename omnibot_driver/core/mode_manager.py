@@ -26,22 +26,20 @@ The request is a pause or a reset. A paused board sends a «Paused» text every 
 sends only data, the command of the request was lost.
 """
 FLOWING_S: Final = 0.1
-"""Longest time, in s, that one interval between two reads can add to the time for
-``PAUSE_RETRY_S``.
+"""Largest part, in s, of an interval between two reads that counts for ``PAUSE_RETRY_S``.
 
-A running board sends every 10 ms. If an interval is longer than ``FLOWING_S``, the board may not
-have sent data all the time. So only ``FLOWING_S`` of this interval is counted.
+A running board sends every 10 ms. In a longer interval, the board may have sent nothing for some
+time, so only this part is counted.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.
 
-A paused board sends a «Paused» text every second. There are two cases in which a text proves
-nothing:
+A paused board sends a «Paused» text every second. In two cases, the text proves nothing:
 
 - The text arrives within this time after a command. The board may have sent the text before it
-  received the command. So the text does not show whether the board obeyed.
+  received the command.
 - Data arrive within this time after the text. The board may have begun to run after it sent the
-  text. So the text does not show that the board is paused now.
+  text.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -100,9 +98,8 @@ class ModeManager:
         self._mode_known = False
         """Whether the board's mode was known when the last reset was sent.
 
-        If a board that was not paused reports a pause after the reset, it has restarted. If its
-        mode was unknown, the board may have been paused before the reset, so its report does not
-        show a restart.
+        A pause that begins after the reset shows a restart. If the mode was unknown, the pause may
+        have begun before the reset, so it does not show a restart.
         """
         self._shown_at = math.inf
         self._request: Request | None = None

@@ -71,8 +71,8 @@ class PoseReading:
 
     * ``lost``: number of lost displacements whose motion this pose includes. ``lost`` of the next
       DisplacementReading does not include them.
-    * ``restarted``: whether the counter of this pose shows that the board has restarted. The
-      displacements before this pose did not show it.
+    * ``restarted``: whether the counter of this pose shows a restart of the board that the
+      displacements before this pose did not show.
     """
 
     x_m: float
@@ -168,16 +168,13 @@ Reading = (
 class SampleBoundary:
     """How far the stream of IMU samples had arrived when a read of the port ended.
 
-    * ``ahead``: 1 if the read contains at least the first part of a sample that was not returned as
-      an ImuReading yet, else 0.
+    * ``ahead``: 1 if at least the first part of a sample has arrived that was not returned as an
+      ImuReading yet, else 0.
     * ``cut``: whether the end of this sample is missing. Such a sample is called a cut sample.
-
-    The times are in s after the read:
-
-    * ``latest_s``: latest time at which the cut sample can be complete. It is 0 without a cut
-      sample.
-    * ``earliest_s``: earliest time at which the cut sample can be complete. Without a cut sample,
-      this is the earliest time at which the next sample can be complete.
+    * ``latest_s``: latest time at which the cut sample can be complete, in s after the read. It is
+      0 without a cut sample.
+    * ``earliest_s``: earliest time at which the cut sample, or the next sample if none is cut, can
+      be complete, in s after the read.
     """
 
     ahead: int

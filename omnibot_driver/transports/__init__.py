@@ -70,9 +70,9 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets.
 
-        One of several lines may be missing. Such a line gets only the bytes that it accepts at
-        once. The other bytes for it are discarded. Raises LinkError if the connection is lost. Then
-        all bytes that are not sent yet are discarded.
+        If one of several lines is missing, this line gets only the bytes that it accepts at once,
+        and its other bytes are discarded. Raises LinkError if the connection is lost. Then all
+        bytes that are not sent yet are discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -131,10 +131,11 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line.
 
-        If a line does not accept all bytes at once, the remaining bytes wait, and are sent later.
-        If a line has had waiting bytes for 0.2 s without a break, they are discarded, and the line
-        is regarded as missing. The port of a missing line may still be open. Then only the bytes
-        that the port accepts at once are written to it.
+        * If a line does not accept all bytes at once, the remaining bytes wait, and are sent later.
+        * If a line has had waiting bytes for 0.2 s without a break, they are discarded, and the
+          line is regarded as missing.
+        * If the port of a missing line is still open, it gets only the bytes that it accepts at
+          once.
         """
         now = time.monotonic()
         with self._writing:

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of a controlled turn, as the server has recorded it in a file (LAST TURN).
+"""The file in which the server records the angle of a controlled turn (LAST TURN).
 
-The public server never closes a file after it has sent it, and it can have only about 1,000 files
-open. For this reason, the driver downloads only a few files. This module knows the form of the
-file; it does not know when the file is downloaded.
+The public server never closes a file that it has sent, and can have only about 1,000 files open. So
+the driver downloads only a few files. This module knows the form of the file; it does not know when
+the file is downloaded.
 """
 
 import re

@@ -54,8 +54,8 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last reported count, if the start command may be lost; otherwise 0. The command
-    may be lost if this count differs by at most 1 from the count before the command.
+    ``maybe``: the last reported count while the start command may have been lost; otherwise 0. The
+    command may have been lost if the reported count is nearly the same as before the command.
     """
 
     def __init__(self) -> None:
@@ -87,13 +87,11 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        If the server has acknowledged the motion, nothing changes. If it has not, there are two
-        cases:
-
-        - A count of the motion has come, so the motion had begun. A server that no longer knows of
-          it was restarted. The pose already includes the counts of the motion.
-        - No count of the motion has come. The motion did not begin, and the count continues from
-          its value before the start command.
+        * The server has acknowledged the motion. Nothing changes, and the result is False.
+        * A count of the motion has come, without an acknowledgement. The motion had begun, so the
+          server was restarted. The pose already includes the counts of the motion.
+        * Neither has come. The motion did not begin, and the count continues from its value before
+          the start command.
         """
         if self._confirmed:
             return False

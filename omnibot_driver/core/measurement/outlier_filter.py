@@ -37,11 +37,10 @@ CALMING: Final = 0.95
 STILL: Final = 0.08
 """Limit for spikes of the IMU, as a fraction of the spike's size.
 
-After a spike, the next reading differs from the reading before the spike by at most this fraction.
-If it differs by more, the change was not a spike.
-
-The same fraction decides whether only one value of a reading has changed: all other values must
-have changed by at most this fraction of the largest change.
+* After a spike, the next reading differs from the reading before the spike by at most this
+  fraction. If it differs by more, the change was not a spike.
+* If a flipped bit has changed a value, all other values of the reading have changed by at most this
+  fraction of the flipped value's change.
 """
 END_OF_SCALE: Final = 0.99996
 """Fraction of the accelerometer's full scale. A reading of at least this fraction is regarded as
@@ -94,10 +93,10 @@ class OutlierFilter:
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: whether the board corrects its own odometry. Such a correction can look like an
-      impossible motion. So if ``corrected`` is True, the filter passes on an impossible but finite
-      displacement, with ``measured`` set to False. If the duration of the displacement is known and
-      not 0, the filter also sets ``possible`` to False.
+    * ``corrected``: whether the board corrects its own odometry. A correction can look like an
+      impossible motion. So the filter passes on an impossible but finite displacement, with
+      ``measured`` set to False. It also sets ``possible`` to False, except if the duration of the
+      displacement is 0 or unknown.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -252,11 +251,10 @@ class _Spikes:
 
     The values are scaled so that a change of 1 between two readings is always plausible.
 
-    * ``left``: largest difference between the readings before and after a spike, as a fraction of
-      the spike's size.
-    * ``knocked``: number of values, from the beginning of the list, that can change implausibly
-      much because something knocks against the robot. Such a change may be a spike only if one
-      flipped bit explains it.
+    * ``left``: the limit ``STILL`` or ``BACK``.
+    * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
+      can also change implausibly much. Such a change may be a spike only if one flipped bit
+      explains it.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -313,11 +311,11 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether one flipped bit can explain a change.
 
-        ``step``: size of the change. It may differ from the value of a bit by up to
-        ``OUT_OF_PROPORTION`` times the largest recent change, because the readings vary.
+        ``step``: size of the change. The readings vary, so the size may differ from the value of a
+        bit by up to ``OUT_OF_PROPORTION`` times the largest recent change.
 
-        ``value``: magnitude after the change. If it is at the end of the scale, the result is
-        False, because a knock against the robot can also cause such a value.
+        ``value``: magnitude after the change. At the end of the scale, the result is False, because
+        a knock against the robot can also cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -23,9 +23,9 @@ class StreamStatistics:
 
     All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. With it, the driver computes how many IMU readings
-      the board has sent during a displacement. If fewer have arrived, the missing ones are counted
-      as lost. The period is None if each IMU reading itself says how many were lost (``lost``).
+    * ``imu_period_s``: period of the IMU in s. With it, the driver counts the IMU readings that are
+      missing between two displacements. None if each IMU reading itself says how many were lost
+      (``lost``).
     """
 
     imu_period_s: float | None = None
@@ -52,10 +52,10 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """Number of IMU readings that the board had sent before the last displacement.
+    """Number of IMU readings that the board had sent before the last displacement; None if unknown.
 
-    It is the value of ``imu + lost_imu`` at the time of that displacement. If a later pose shows
-    that further displacements are lost, their IMU readings are added. None: the number is unknown.
+    If a later pose shows that displacements are lost, the IMU readings of these displacements are
+    added.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
 

@@ -63,9 +63,8 @@ _DIRECTIONS: Final = tuple(
 )
 """Directions in which the distance to the hull is computed.
 
-The direction of the true distance can be between two of them. Then the computed distance is too
-small: by up to 2 % of the distance, plus a tenth of the hull's length. The error is largest near
-the middle of a long side.
+If the direction of the true distance is between two of them, the computed distance is too small: by
+up to 2 % of the distance, plus a tenth of the hull's length.
 """
 
 

@@ -18,9 +18,8 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-So a displacement is compared with two groups of set-points: those in effect while the displacement
-was measured, and those in effect in the last RISING_S before this measurement began. If a robot is
-clearly slower than all of them, it is assumed to be held.
+A robot is assumed to be held if it is clearly slower than all its recent set-points: those in
+effect while the displacement was measured, or in the RISING_S before.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01

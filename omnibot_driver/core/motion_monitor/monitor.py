@@ -130,8 +130,8 @@ class MotionMonitor:
         """Record that the driver's e-stop was released.
 
         The board has an e-stop of its own, which may still hold the robot. So a robot that does not
-        obey motion commands now has the fault HELD_BY_ESTOP. After the robot has moved as
-        commanded, such a robot has the fault BLOCKED again.
+        obey motion commands has the fault HELD_BY_ESTOP instead of BLOCKED, until the robot has
+        moved as commanded.
         """
         self._released = True
 
@@ -158,9 +158,8 @@ class MotionMonitor:
     def count_impossible(self, now: float) -> Fault | None:
         """Return the fault that four impossible displacements in a row show, or None.
 
-        Call this method instead of ``check`` for an impossible displacement of a board that
-        corrects its own odometry. The outlier filter passes such a displacement on, because it may
-        be a correction. Fewer than four in a row are regarded as corrections of the board's
+        Call this method instead of ``check`` if the board corrects its own odometry and the
+        displacement is impossible. Fewer than four in a row are regarded as corrections of the
         odometry.
         """
         self._error.reset()
@@ -246,11 +245,12 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """Return UNCOMMANDED if the robot moves without a command, and Stop is due; otherwise None.
+        """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
-        ``begins``: whether the following error exceeds its limit now. The first Stop is due when
-        this is true. If the robot continues to move, for example because somebody pushes it, Stop
-        is due again, after longer and longer times.
+        Stop is due when the following error exceeds its limit. If the robot continues to move, for
+        example because somebody pushes it, Stop is due again, after longer and longer times.
+
+        ``begins``: whether the following error exceeds its limit now.
         """
         if not self._error.outside:
             self._stood_s += seconds

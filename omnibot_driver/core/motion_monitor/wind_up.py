@@ -57,13 +57,12 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m by which the robot fell behind in the last, long displacement.
+        """Distance in m by which a held robot fell behind in the last displacement, if it was long.
 
-        A single long displacement does not prove that the robot is held, so this distance is not
-        part of the wind-up yet. If the robot is also held in the next displacement, this distance
-        is added to the wind-up, and the attribute is set to 0.
+        A single long displacement does not prove that the robot is held. So the wind-up does not
+        include this distance until the robot is also held in the next displacement.
 
-        The attribute is None if the robot was not held in the last displacement.
+        0: the wind-up includes the distance. None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:

@@ -127,8 +127,8 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """The place in the stream of IMU frames at which the last read ended; None if unknown.
 
-        The driver computes the place from the bytes that are received but not decoded yet. These
-        bytes may be the beginning of an IMU frame. In this case, the read ended within this frame.
+        Bytes that are received but not decoded yet may be the beginning of an IMU frame. In this
+        case, the read ended within this frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)

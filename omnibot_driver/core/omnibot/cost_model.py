@@ -66,8 +66,8 @@ chance."""
 KNOWN_GAP: Final = 11.0
 """Cost of a frame that contains a pause, on a line that has paused only between frames so far.
 
-On any line, a pause of ``late_reads.IDLE_S`` or longer within a frame has this cost. The cost is
-high, so only strong evidence makes the decoder accept such a frame.
+A pause of ``late_reads.IDLE_S`` or longer has this cost on any line. The cost is so high that only
+strong evidence makes the decoder accept such a frame.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""

@@ -96,9 +96,9 @@ def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
     If so, a shock of the robot has caused the unusual content, not damage. The result is also False
-    if the bytes after the complete frame cannot begin another frame.
+    if the complete frame is followed by bytes that cannot begin another frame.
 
-    ``closed``: whether no more bytes come. If ``held`` ends at ``at``, the result is ``closed``.
+    ``closed``: whether no more bytes come. This is the result if ``held`` ends at ``at``.
     """
     if at == len(held):
         return closed

@@ -22,9 +22,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: the new position in the sequence when the position is ``at`` and a frame of
-    ``kind`` arrives. The frame belongs to the next place with this kind, at ``at`` or later. The
-    new position is the one after this place.
+    ``after[kind][at]``: the new position in the sequence when a frame of ``kind`` arrives at the
+    position ``at``. It is the position after the next ``kind``, searched from ``at`` on.
     """
 
     def __init__(self, *kinds: Kind) -> None:

@@ -2,9 +2,10 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-If the line was idle within a supposed frame, bytes were lost there: the beginning and the end of
-the supposed frame come from different ticks. So all later frames seem late by whole ticks. If only
-the reader was late, later frames are on time again.
+* The line was idle. If the pause is within a supposed frame, bytes were lost there: the beginning
+  and the end of the supposed frame come from different ticks. All later frames then seem late by
+  whole ticks.
+* Only the reader was late. Later frames are then on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
 contains, or which frames are accepted.
@@ -44,13 +45,12 @@ PUNCTUAL_S: Final = 1e-3
 PACE_S: Final = 2e-4
 """Tolerance in s for the check whether bytes arrived as fast as the line sends them.
 
-The check compares the time in which the bytes arrived with the time that the line needs to send
-them. If the two times differ by less than this tolerance, the bytes did not wait for the reader.
+Bytes that arrived as fast did not wait for the reader.
 """
 FEW_BYTES: Final = 2
 """Number of bytes. The driver measures how fast bytes arrive only if there are more than this."""
 TICKS_TO_PROVE: Final = 2
-"""If this number of further late ticks follows a first late tick, bytes were lost.
+"""Number of further late ticks, after a first late tick, that prove that bytes were lost.
 
 Each further tick must be in a separate read, and must be as late as the first late tick. After a
 pause of ``IDLE_S`` or more, one further tick is enough.
@@ -168,9 +168,8 @@ def _by_the_next_frame(
 ) -> Cause:
     """Return the cause of a pause within a frame, as far as the next frame shows it.
 
-    The two frames may be wrong: each may consist of parts of two real frames, with the idle time
-    between them. These idle times end a whole number of ticks apart. So the line was idle if the
-    next frame also contains a pause, and if the two pauses end a whole number of ticks apart.
+    The line was idle if the next frame also contains a pause, and if the two pauses end a whole
+    number of ticks apart. Each of the two frames then consists of parts of two real frames.
 
     ``start``: position of the next frame. ``first``: the read that ended the pause in the frame
     before.

@@ -31,18 +31,17 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
 
-The check adds up the deltas twice, once in each frame. The error of each sum is its distance from
-the board's pose. The pose contradicts the configured frame if two conditions are true: the error
-in this frame is above ``CLEARLY_M``, and it is above ``TIMES`` times the error in the other frame.
+The check adds up the deltas once in each frame. The error of a sum is its distance from the board's
+pose. The pose contradicts the configured frame if the error in this frame is above ``CLEARLY_M``,
+and above ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
 """Limits for the advice to change the configured period of the deltas.
 
-The driver gives the advice if the deltas show another period. ``FEWEST_DELTAS``: number of
-consecutive deltas that must show the same other period. ``FOR_S``: time in s for which the deltas
-must show this other period.
+The driver gives the advice if at least ``FEWEST_DELTAS`` deltas in a row show the same other
+period, for at least ``FOR_S`` (in s).
 """
 RATE_TOLERANCE: Final = 0.1
 

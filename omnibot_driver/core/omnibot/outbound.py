@@ -26,18 +26,18 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """The zeros that are sent before Stop, the emergency stop or a letter.
 
-They have two purposes. The first: the previous frame may have lost its end, and seven zeros
-complete it. An eighth zero is sent, because one of the zeros may be lost, too. The second: the
-zeros wake a board. Three zeros are enough for this.
+* They complete a previous frame that has lost its end. Seven zeros are enough; the eighth is sent
+  because one of them may be lost, too.
+* They wake a board. Three zeros are enough for this.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """The zeros that are sent before a motion frame.
 
-The previous frame may have lost its end. Then the zeros may complete it, and the board obeys a
-wrong command until the motion frame replaces this command. The motion frame follows sooner after
-four zeros than after the eight of ``ZEROS``.
+If the previous frame has lost its end, the zeros may complete it to a wrong command. The board
+obeys this command until the motion frame arrives. After four zeros, the motion frame arrives sooner
+than after the eight of ``ZEROS``.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

@@ -19,13 +19,12 @@ WRAP: Final = 256
 LATE_S: Final = 0.5
 """Limit, in s, for the difference between two measures of the time from one delta to the next.
 
-One measure is the elapsed time, which is the difference of the arrival times. The other is the
-difference of the counters times the period. If they differ by more than the limit, the board may
-have restarted. The limit is larger for a longer elapsed time, because the board's clock drifts
-(``DRIFT``).
+The measures are the difference of the arrival times, and the difference of the counters times the
+period. If they differ by more than the limit, the board may have restarted. The limit grows with
+the elapsed time, because the board's clock drifts (``DRIFT``).
 
 An arrival time can be wrong by up to 0.24 s, if the host's buffer is full and every tenth byte is
-lost. The limit is larger than this error, so the error alone does not look like a restart.
+lost. The limit is larger than this error.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and of times that are computed from its counters.
@@ -36,10 +35,9 @@ board's pose can then prove a restart.
 EARLY_S: Final = 0.2
 """Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-After a restart, the counter shows the time since the restart. The elapsed time is longer: it begins
-when the driver reads the last delta before the restart, and includes the duration of the restart.
-This duration is longer than ``EARLY_S``. The elapsed time is shorter only if the driver read the
-last delta very late. The tolerance allows for this case.
+The check compares the time that the counter shows with the time since the last delta was read. If
+the driver read the last delta very late, the second time is too short. The tolerance allows for
+this case.
 """
 LONG_GAP_S: Final = 1.0
 """A pose does not show a restart if deltas of more than this duration, in s, are missing before it.

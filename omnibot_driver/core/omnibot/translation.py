@@ -38,8 +38,8 @@ MOST_TEXTS_LOST: Final = 9
 """Largest number of "Paused" texts that can have been lost since the last received one.
 
 The counter in the texts shows how many were lost. The board sends one text a second, and the driver
-waits less than 10 s for the result of a reset. So in this time, at most 9 texts can be lost. If the
-counter shows more, the board has restarted, and its counter has begun again.
+waits less than 10 s for the result of a reset. If the counter shows more lost texts, it has begun
+again, because the board has restarted.
 """
 FULL: Final = 4000
 """Number of bytes in a read from which on the kernel's buffer of 4 KiB counts as full.
@@ -50,9 +50,8 @@ number is below 4096.
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The next read is late if it has more bytes than the board can send in the time between the two
-reads. To allow for errors, sending the bytes must take longer than twice this time plus
-``BURST_S``.
+The next read is late if the board needs more than twice the time between the two reads, plus
+``BURST_S``, to send the bytes of the next read.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
@@ -122,12 +121,10 @@ class Translation:
     def _sent_s(self, count: int, now: float) -> float:
         """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
-        If the read was not late, the result is ``now``.
-
-        While the driver was late, the kernel's buffer may have become full. A full buffer keeps its
-        bytes, and loses all bytes that arrive later. So no byte is missing within the buffer, even
-        if the driver needs several reads to empty it: the board sent the bytes of this read
-        directly after those of the previous read. Their number shows how long the sending took.
+        If the read was not late, the result is ``now``. If it was late, the board sent these bytes
+        directly after those of the previous read, so ``count`` shows how long the sending took.
+        This is true even if the kernel's buffer was full: the buffer keeps its bytes, and loses
+        only later bytes.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S

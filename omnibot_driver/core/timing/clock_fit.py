@@ -27,11 +27,11 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Position in a time span, from 0 (start) to 1 (end), that selects the fitted clock.
+"""Position of the edge that is used as the fitted clock, from 0 (start) to 1 (end).
 
-If no lower bounds are used, the fitted clock is an edge of the lower convex hull of the latest
-points: the edge at this position in the hull's time span. With a larger value, the clock follows
-recent points more closely, but jitter affects it more.
+Without lower bounds, the fitted clock is an edge of the lower convex hull of the latest points. The
+position is that in the hull's time span. With a larger value, the clock follows recent points more
+closely, but jitter affects it more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the

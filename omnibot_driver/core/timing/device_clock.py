@@ -222,8 +222,8 @@ class DeviceClock:
         Return the correction in ticks. It is positive if the count was too low because of lost
         ticks.
 
-        ``counted``: whether this read contains a displacement. The tick number of the last
-        displacement is corrected too if ``counted`` is True, or if all recent arrivals were late.
+        ``counted``: whether this read contains a displacement. If it does, or if all recent
+        arrivals were late, the tick number of the last displacement is corrected too.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -270,10 +270,10 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record the delay of a new tick, and the time ``now`` at which the tick was read.
 
-        If the previous tick was read less than half a period earlier, it had waited to be read. The
-        new delay then replaces the delay of the previous tick.
-
         ``lag_s``: the delay in s. It is the tick's arrival minus its time by the fitted clock.
+
+        If the previous tick was read less than half a period earlier, the previous tick had waited
+        to be read. So the new delay replaces its delay.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -290,9 +290,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: this step's share of the time in s from the last stamp to the read. The stamps
-        of a read share this time, because none may be later than the read. The smallest step is
-        half a period or ``room_s``, whichever is shorter, but at least ``SMALLEST_STEP_S``.
+        ``room_s``: this step's share of the time in s from the last stamp to the read. The smallest
+        step is half a period or ``room_s``, whichever is shorter, but at least ``SMALLEST_STEP_S``.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

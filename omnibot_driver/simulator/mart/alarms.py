@@ -189,9 +189,11 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels.
 
-    ``right``, ``left``: changes in units of the motor registers; forward is positive. If a wheel
-    would exceed the full speed, it gets the full speed, and the other wheel becomes slower by the
-    excess. Full speed is 128 units forward, and 127 units backward.
+    ``right``, ``left``: changes in units of the motor registers; forward is positive.
+
+    A wheel that would exceed the full speed gets the full speed, and the other wheel becomes slower
+    by the excess. Full speed is 128 units forward, and 127 units backward. A wheel that would
+    change its direction stops.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

@@ -2,9 +2,9 @@
 
 """The start of each kind of motion, and its end by a command.
 
-A start or an end has several steps. Each step is a function that the server calls later, with the
-server as an argument. The function does not store the server. So if the server is copied, the copy
-can call the later steps, too. This module knows motions; it does not know the words of commands.
+A start or an end has several steps. Each step is a function that the server calls later. The
+function gets the server as an argument, so a copy of the server can call the later steps, too. This
+module knows motions; it does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING

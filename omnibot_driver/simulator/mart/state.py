@@ -167,8 +167,8 @@ class ServerState:
         """Record the time at which the server samples the IMU in a forward drive (RM).
 
         With the quirk ``heading_starts_off``, the first sample of a drive changes the heading. The
-        change grows with the time since the last drive, and is huge if the clock was set back since
-        then.
+        change grows with the time since the last drive. If the clock was set back since then, the
+        change is huge.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s

@@ -30,11 +30,10 @@ REQUESTS: Final = 3
 The middleware drops the answer if the driver has not discovered the new client within 0.1 s.
 """
 SPIN_S: Final = 0.005
-"""Time, in s, for which one call of the executor waits for a message.
+"""Time, in s, for which one call of the executor waits for a message; the same for all calls.
 
-All calls have this same timeout: only then does rclpy's executor take turns between the
-subscriptions. With different timeouts on a busy computer, the executor would handle only the IMU's
-messages, and not those of the e-stop.
+With different timeouts on a busy computer, rclpy's executor would handle only the IMU's messages,
+and not those of the e-stop.
 """
 
 

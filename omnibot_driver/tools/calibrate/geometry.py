@@ -188,10 +188,9 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first error is with the driver's current geometry.
-
-    The second error is with the geometry ``found``, but with its mean radius for all three wheels.
-    The driver could not use three different radii, because it has no parameters for single wheels.
+    The first error is with the driver's current geometry, the second with the geometry ``found``.
+    The driver has no parameters for single wheels, so the second error is computed with the mean
+    radius of ``found`` for all three wheels.
     """
     before: list[float] = []
     after: list[float] = []

@@ -26,11 +26,10 @@ STOPS_PART: Final = 0.5
 The early and the late speed are those of the first and the second half of a drive.
 """
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Limits for two speeds: of a drive, and of a second drive with twice the command.
+"""Limits for the speed of a drive with twice the command, divided by the speed of a first drive.
 
-The limits apply to the second speed divided by the first one. ``DOUBLED``: range in which the speed
-is regarded as doubled. ``UNCHANGED``: largest value for which the speed is regarded as unchanged.
-The limits allow for friction and rounding.
+``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: largest value for which
+the speed is regarded as unchanged. The limits allow for friction and rounding.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.

@@ -131,9 +131,9 @@ class Obedience:
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
         """Add the motion since the last call to the sums of commanded and measured motion.
 
-        Compare the sums after 1 s, or after 3 s if the board rarely measures its motion. Raises
-        ToolError if the measured motion is less than a fifth of the commanded motion. Commands
-        slower than ``PLAIN`` are not checked.
+        The sums are compared after 1 s, or after 3 s if the board rarely measures its motion.
+        Raises ToolError if the measured motion is then less than a fifth of the commanded motion.
+        Commands slower than ``PLAIN`` are not checked.
 
         ``seconds``: time since the last call. ``measured``: measured velocity, in the units of
         ``command``.

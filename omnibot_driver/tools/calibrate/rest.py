@@ -2,9 +2,8 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A tilt of the sensor, a slope of the floor, and a bias of the accelerometer at right angles to
-gravity have the same effect on the readings. The readings do not show which of them is the cause.
-Therefore, only the part of the accelerometer's bias along gravity is found.
+A bias of the accelerometer at right angles to gravity has the same effect on the readings as a tilt
+of the sensor or a slope of the floor. So only the part of the bias along gravity is found.
 
 This module knows readings; it does not know how they are recorded.
 """

@@ -101,8 +101,8 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether a robot with these signs of its axes would be a mirror image of the real one.
 
-    This is so if sign(x) sign(y) differs from sign(yaw). If the user takes another side of the
-    robot for its front, other signs result, but not those of a mirror image.
+    This is so if sign(x) sign(y) differs from sign(yaw). If the user only takes another side of the
+    robot for its front, the result is False.
     """
     x, y, yaw = signs
     return x * y != yaw

@@ -74,9 +74,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: function for the model's response to a unit step. Its argument contains one time
-        for each delta: from the unit step to the end of the delta, in ticks. It returns the mean
-        rate in each delta.
+        ``mean``: function that returns the model's mean rate in each delta after a unit step. Its
+        argument has one time for each delta: from the unit step to the end of the delta, in ticks.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps

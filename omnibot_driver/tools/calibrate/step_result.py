@@ -20,8 +20,8 @@ The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 MANY: Final = 1.5
 """Limit for the ratio of the residuals to the quantisation error. Above it, the tool warns.
 
-Large residuals may mean that the computer delayed commands. With delayed commands, the residuals
-are twice as large as without. The delay that the tool finds for the wheel is then 4 ms too long.
+Large residuals may mean that the computer delayed commands. The residuals are then twice as large
+as usual, and the delay that the tool finds for the wheel is 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of two residuals: the motor model's, divided by the second-order model's.

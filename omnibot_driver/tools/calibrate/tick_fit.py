@@ -67,8 +67,8 @@ class PlantFit:
     marks: Marks | None = None
     """Distances between the encoder's marks; None if the marks are assumed to be evenly spaced.
 
-    Uneven marks cause errors of the times between ticks, and the pattern of these errors repeats
-    with each turn. If the tool finds no such pattern, it assumes evenly spaced marks.
+    Uneven marks cause errors of the times between ticks that repeat with each turn. If the tool
+    finds no such errors, it assumes evenly spaced marks.
     """
 
     @property

@@ -2,10 +2,10 @@
 
 """Find the positions of an encoder's marks from several records of a wheel.
 
-A *mark* is a place on the encoder's disc at which the board counts a tick. Uneven distances between
-marks cause errors of the times between ticks, which repeat in each turn of the wheel. It is not
-known at which mark a record begins. Input: the errors of the times; output: the distances between
-the marks.
+A *mark* is a place on the encoder's disc at which the board counts a tick. If the distances between
+marks are uneven, the times between ticks have errors that repeat in each turn of the wheel. It is
+not known at which mark a record begins. Input: these errors; output: the distances between the
+marks.
 """
 
 from collections.abc import Sequence
@@ -112,8 +112,7 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    It is the median of the errors of all times from this mark to the next. The mean of these
-    medians is then subtracted, so that the mean of the result is zero.
+    Each error is the median over all records, minus the mean of these medians.
 
     ``rows``: for each record, the relative errors of its times between ticks.
 

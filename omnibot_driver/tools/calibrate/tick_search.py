@@ -52,12 +52,12 @@ The load changes slowly. Therefore residuals are correlated even at this distanc
 MISSED: Final = 0.42
 """Limit for the sum of the relative errors of two successive times between ticks.
 
-If the sum is larger, the board has missed a mark within the earlier time. The earlier time then
-covers two distances between marks, so it is twice as long as expected. Its relative error is 1, and
-the sum is about 1. The board's clock can lose up to 6 ms, which makes the sum smaller.
+Above the limit, the board has missed a mark within the earlier time.
 
-The board may also notice a mark late. Then the earlier time is too long, and the later one is too
-short. The sum is near 0, which is below the limit.
+* Missed mark: the earlier time covers two distances between marks, so its relative error is 1, and
+  the sum is about 1. The sum is smaller if the board's clock loses time, which can be up to 6 ms.
+* Mark noticed late: the earlier time is too long, and the later one is too short. The sum is near
+  0.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which no missed mark is searched for.
@@ -231,9 +231,9 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the plant's own values, which are the same in all records.
 
-        The covariance is computed from the residuals. But the load changes slowly, so it can differ
-        from record to record, and the results of the records can differ by more than the residuals
-        predict. If they do, this method increases the covariance until it covers these differences.
+        The covariance is computed from the residuals. But the load changes slowly, so the results
+        of the records can differ by more than the residuals predict. If they do, the covariance is
+        increased until it covers these differences.
         """
         own = 1 + self.order
         found = self._search(values)

@@ -83,8 +83,8 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    ``now``: the present gains, with which other gains are compared. Each motor's errors with other
-    gains are divided by the errors that the same motor has with the present gains.
+    ``now``: the present gains. For each motor, the errors with other gains are divided by the
+    errors with these gains.
 
     Raises ToolError if no gains are within the limits.
     """

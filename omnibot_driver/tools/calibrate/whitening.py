@@ -17,13 +17,11 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
-    If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0: independent errors
-    have a correlation of 0, and displaced encoder marks cause one of -0.5. If ``lags`` is larger,
-    each value is multiplied by a factor that decreases with the lag.
-
     ``rows``: rows of successive residuals.
 
-    ``lags``: the largest lag.
+    ``lags``: the largest lag. If it is 1, the value for lag 1 is limited to the range from -0.5
+    (only displaced encoder marks) to 0 (only independent errors). If it is larger, each value is
+    multiplied by a factor that decreases with the lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

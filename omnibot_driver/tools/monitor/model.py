@@ -30,11 +30,10 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: terms, in m and m/s, of the largest distance by which the pose may move
-between two messages.
+"""``JUMP_M``, ``JUMP_MPS``: terms of the largest motion of the pose between two messages.
 
-This distance is JUMP_M + JUMP_MPS · time between the messages. If the pose moves farther, the
-odometry was reset, and the model begins a new path.
+In the time t between two messages, the pose may move by JUMP_M + JUMP_MPS · t, in m. If the pose
+moves farther, the odometry was reset, and the model begins a new path.
 """
 
 

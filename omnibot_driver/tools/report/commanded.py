@@ -14,8 +14,7 @@ WHEEL_WEIGHT_M: Final = 0.029
 """Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
 
 The factors fit an OmniBot, but they are used for all robots. This is accurate enough, because they
-have only two uses. They decide which speeds are motion, and how much each axis counts in the search
-for the lag. They do not change the reported ratios of measured to commanded motion.
+only decide which speeds are motion, and how much each axis counts in the search for the lag.
 """
 
 

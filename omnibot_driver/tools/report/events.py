@@ -18,9 +18,9 @@ LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
 """Time in s after which /diagnostics shows whether the driver still ran at the end of a log.
 
-The last state in the log may be "disconnected" for two reasons: the driver has ended, or it has
-lost its board and still runs. A driver that still runs shows this state on /diagnostics more than
-``SILENT_S`` after the state began. If /diagnostics does not show it then, the driver has ended.
+If the last state in the log is "disconnected", the driver has ended, or it has lost its board. If
+the driver still runs, /diagnostics shows this state more than ``SILENT_S`` after the state began.
+Otherwise the driver has ended.
 """
 
 

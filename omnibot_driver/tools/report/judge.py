@@ -67,9 +67,9 @@ def _all(log: Log) -> Iterator[Finding]:
 def _missing_imu(log: Log) -> Level:
     """Return how severe it is that the log has no message of the IMU; GOOD if the board has none.
 
-    For a board with an IMU, the driver's Stream status has values for the IMU. If there are several
-    robots, with and without an IMU, the status does not show which of them has it. Then only a
-    topic shows that this robot has an IMU.
+    The driver's Stream status has values for the IMU if the board has one. If some of several
+    robots have an IMU, the status does not show which. Then only a topic shows that this robot has
+    one.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     told = {any("IMU" in key for key in status.values) for status in streams}

@@ -112,11 +112,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step, the index at which its range ends.
+    """Return, for each long step, the index of the first step after its range.
 
-    Short steps can compensate a long step only within its range. The range begins at the long step,
-    and has ``most`` steps. If another long step comes earlier, the range ends there. The returned
-    index is that of the first step after the range.
+    Short steps can compensate a long step only within its range. The range begins at the long step.
+    It has ``most`` steps, but ends earlier if another long step comes.
 
     ``wide``: indices of the long steps.
     """

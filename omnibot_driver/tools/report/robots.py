@@ -39,8 +39,8 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
     """Return the roles that this topic may have, according to its name.
 
     The key is the role. The value is a pair: the robot's namespace, and whether the topic fits the
-    role. The topic fits if ``kind`` is a message type of the role. For a role such as ``state``, a
-    second condition applies: a node in ``drivers`` must have this topic in its own namespace.
+    role. A topic fits if ``kind`` is a message type of the role. For a role such as ``state``, a
+    node in ``drivers`` must also have this topic in its own namespace.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

@@ -33,9 +33,10 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        If there are several robots, the diagnostics do not show which of them a rate belongs to. So
-        the rate is NaN if the robots have different rates. If the diagnostics of the only robot
-        contain no rate, it keeps its present value, or is NaN for a robot with two wheels.
+        * One robot whose diagnostics contain no rate: the rate keeps its present value, or is NaN
+          for a robot with two wheels.
+        * Several robots: the diagnostics do not show which of them a rate belongs to. So the rate
+          is NaN if the robots have different rates, or none.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]
         if log.alone:

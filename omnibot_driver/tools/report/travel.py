@@ -17,9 +17,9 @@ LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
 """``LEAP_M``, ``LEAP_RAD``: limits, in m and rad, above which a step of the pose is a leap.
 
-A step goes from one message to the next. The limits apply to the difference between the change of
-the pose in the step and the motion that the twist shows. The driver's own corrections of odom do
-not exceed the limits, because fastest_linear_speed limits these corrections.
+A step goes from one message to the next. The limits apply to the part of the step that the twist
+does not show. The driver's own corrections of odom stay below the limits, because
+fastest_linear_speed limits these corrections.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05

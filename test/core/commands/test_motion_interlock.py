@@ -80,10 +80,10 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The motion monitor stops the robot again, but the interlock treats this stop as a first stop.
+    """The motion monitor stops the robot again, more than a minute after the last stop.
 
-    There are two cases: more than a minute has passed since the previous stop, or ~/start was
-    called since then. After a first stop, motion can be allowed again without ~/start.
+    The interlock treats this stop as a first stop: motion can be allowed again without ~/start. The
+    same is true for a stop after a call of ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
