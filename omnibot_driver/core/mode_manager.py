@@ -2,9 +2,9 @@
 
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
-The letters S (start), P (pause) and R (reset) may be lost on the line, so the driver may have to
-repeat them. But a P that is repeated without need resumes a paused board. So the driver repeats P
-only if the board still sends data. Each request has a deadline.
+The letters S (start), P (pause) and R (reset) may be lost on the line. A second P would resume a
+paused board, so the driver repeats P only if the board still sends data. Each request has a
+deadline.
 
 This module does not know bytes, and reads no clock.
 """
@@ -20,10 +20,10 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Time in s for which the board must send data without a pause before the driver repeats a request.
+"""Time in s of uninterrupted data after which the driver repeats a command to pause or to reset.
 
-The request is a pause or a reset. A paused board sends a «Paused» text every second. If the board
-sends only data, the command of the request was lost.
+A paused board sends a «Paused» text every second. If the board sends only data for this time, the
+command was lost.
 """
 FLOWING_S: Final = 0.1
 """Largest part, in s, of an interval between two reads that counts for ``PAUSE_RETRY_S``.

@@ -224,12 +224,11 @@ class Session:
         self._command(self._commanding.pose(goal), now)
 
     def end_goal(self, now: float) -> None:
-        """End a drive to a goal or a docking, because a zero ``cmd_vel`` was refused, e.g. as too
-        old.
+        """End a drive to a goal or a docking, because a zero ``cmd_vel`` was refused.
 
-        These motions have no ``cmd_vel_timeout``, so even a refused zero command must end them. A
-        commanded velocity stays in effect: it expires by itself, and may be newer than the zero
-        ``cmd_vel``.
+        These motions have no ``cmd_vel_timeout``, so even a zero command that is refused, e.g. as
+        too old, must end them. A commanded velocity stays in effect: it expires by itself, and may
+        be newer than the zero ``cmd_vel``.
         """
         self._reporter.notify(self._commanding.end_goal(now))
 

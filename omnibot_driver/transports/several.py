@@ -134,8 +134,8 @@ class Several:
         * If a line does not accept all bytes at once, the remaining bytes wait, and are sent later.
         * If a line has had waiting bytes for 0.2 s without a break, they are discarded, and the
           line is regarded as missing.
-        * If the port of a missing line is still open, it gets only the bytes that it accepts at
-          once.
+        * If the port of a missing line is still open, only the bytes that the port accepts at once
+          are written to it.
         """
         now = time.monotonic()
         with self._writing:

@@ -4,9 +4,8 @@
 
 Arguments: the duration in s, and the namespaces of the robots.
 
-Output: a JSON list. It has an array for each namespace, and the array has a pair for each speed. A
-pair is the time at which the speed was first published, in s of the steady clock, and the speed in
-m/s.
+Output: a JSON list with one array for each namespace. The array has a pair for each speed: the time
+at which the speed was first published, in s of the steady clock, and the speed in m/s.
 """
 
 import json

@@ -85,8 +85,8 @@ class TurnRecords:
         ``request``: the command of the turn.
 
         The result is None if the file belongs to another turn, or has no angle. It is also None if
-        this file has the same name as the previous one: the server could not write a new file, and
-        has sent the old file again.
+        the name is that of the previous file: the server could not write a new file, and has sent
+        the old file again.
         """
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)

@@ -273,8 +273,7 @@ class _Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the values of the last call were a spike, and whether the new values leap.
 
-        Values leap if they change implausibly much. The next call then shows whether they were a
-        spike.
+        Values leap if they change implausibly much; the next call shows whether they were a spike.
 
         ``periods``: number of sampling periods between the previous and the new values.
 

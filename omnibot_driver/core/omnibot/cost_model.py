@@ -279,9 +279,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    This is possible only if the byte occurs in headers. An IMU frame must also meet one of two
-    conditions: the byte is FF, or the frame's last word differs from the last word of the previous
-    IMU frame.
+    The byte must occur in headers. In an IMU frame, the byte must also be FF, or the frame's last
+    word must differ from the last word of the previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -2,10 +2,10 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-A header alone proves nothing: a gyro at rest gives the same bytes. If a frame directly follows an
-accepted one (it is *in step*), it is accepted, except if evidence speaks against it. All other
-bytes are *uncertain*. They wait until the search in ``trellis`` has a clear result, or until
-``DOUBT_BYTES`` are held.
+A header alone proves nothing: a gyro at rest gives the same bytes. A frame that directly follows an
+accepted one is *in step*. It is accepted, except if evidence speaks against it. All other bytes are
+*uncertain*. They wait until the search in ``trellis`` has a clear result, or until ``DOUBT_BYTES``
+are held.
 
 This module reads no clock, and no input makes it raise an exception.
 """

@@ -3,9 +3,9 @@
 """The order in which a running board sends frames, and an estimate of the frames that were lost.
 
 At 25 Hz, the board sends a delta after every fourth IMU frame, and a pose after every fifth delta.
-If bytes were discarded, the driver assumes that they were the next frames in this order. So the
-number of discarded bytes shows which frames were lost. This is only an estimate, which the counters
-in the frames and the arrival times correct.
+The driver assumes that discarded bytes were the next frames in this order, so the number of bytes
+shows which frames were lost. The counters in the frames and the arrival times correct this
+estimate.
 """
 
 from functools import cache
@@ -23,7 +23,7 @@ class Cycle:
     """A repeating sequence of frame kinds.
 
     ``after[kind][at]``: the new position in the sequence when a frame of ``kind`` arrives at the
-    position ``at``. It is the position after the next ``kind``, searched from ``at`` on.
+    position ``at``. It is the position after the first place with this kind, at ``at`` or later.
     """
 
     def __init__(self, *kinds: Kind) -> None:
@@ -62,8 +62,8 @@ class FrameSchedule:
 
         ``skipped``: number of discarded bytes before the frame.
 
-        For a pose, the result is always 0. IMU frames that were lost before a pose are counted
-        later, in the result for the next frame that is not a pose.
+        For a pose, the result is 0. IMU frames that were lost before a pose are counted in the
+        result for the next frame that is not a pose.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

@@ -45,7 +45,7 @@ PUNCTUAL_S: Final = 1e-3
 PACE_S: Final = 2e-4
 """Tolerance in s for the check whether bytes arrived as fast as the line sends them.
 
-Bytes that arrived as fast did not wait for the reader.
+Within this tolerance, the bytes did not wait for the reader.
 """
 FEW_BYTES: Final = 2
 """Number of bytes. The driver measures how fast bytes arrive only if there are more than this."""

@@ -40,7 +40,7 @@ FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
 """Limits for the advice to change the configured period of the deltas.
 
-The driver gives the advice if at least ``FEWEST_DELTAS`` deltas in a row show the same other
+The driver gives the advice only if at least ``FEWEST_DELTAS`` deltas in a row show the same other
 period, for at least ``FOR_S`` (in s).
 """
 RATE_TOLERANCE: Final = 0.1

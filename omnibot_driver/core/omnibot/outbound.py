@@ -27,7 +27,7 @@ ZEROS: Final = bytes(8)
 """The zeros that are sent before Stop, the emergency stop or a letter.
 
 * They complete a previous frame that has lost its end. Seven zeros are enough; the eighth is sent
-  because one of them may be lost, too.
+  because one of the zeros may be lost, too.
 * They wake a board. Three zeros are enough for this.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser

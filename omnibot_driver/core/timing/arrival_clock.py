@@ -18,7 +18,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time. Each stamp is later than the stamp before it.
 
-    If a read comes almost at the same time as the read before it, its stamps can be a little later
+    If two reads come almost at the same time, the stamps of the later read can be a little later
     than its arrival time. In all other cases, no stamp is later than the arrival time.
     """
 

@@ -20,18 +20,18 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-An adapter with a timer delays reads by different times, and the delays repeat: every 20 s, if the
-timer's period is wrong by 100 ppm. So 75 s are long enough to contain the smallest delay.
+An adapter with a timer delays reads by different times. If the timer's period is wrong by 100 ppm,
+the delays repeat every 20 s. So 75 s are long enough to contain the smallest delay.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Position of the edge that is used as the fitted clock, from 0 (start) to 1 (end).
+"""Position of the edge that is used as the fitted clock, in the hull's time span (0 to 1).
 
-Without lower bounds, the fitted clock is an edge of the lower convex hull of the latest points. The
-position is that in the hull's time span. With a larger value, the clock follows recent points more
-closely, but jitter affects it more.
+Without lower bounds, the fitted clock is an edge of the lower convex hull of the latest points. A
+larger value selects a later edge: the clock follows recent points more closely, but jitter affects
+it more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -42,10 +42,9 @@ LATE_PART: Final = 0.1
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest difference between the upper and the lower bound of a block, as a fraction of a period.
-If they differ more, the lower bound is not used.
 
-The limit is wide enough for an adapter with a 16 ms timer: its bounds differ by less than 2 ms,
-which is a fifth of a 10 ms tick.
+If the bounds differ more, the lower bound is not used. With an adapter with a 16 ms timer, the
+bounds differ by less than 2 ms, which is a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]

@@ -31,8 +31,8 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads that certainly include a read with little delay.
 
-An adapter with a timer of 16 ms reads at five phases of a 10 ms tick. Each phase has its own delay.
-In 12 reads, each phase occurs twice, so the phase with the least delay occurs, too.
+An adapter with a timer of 16 ms reads at five phases of a 10 ms tick, each with its own delay. In
+12 reads, each phase occurs twice, so the phase with the least delay occurs, too.
 """
 CALM: Final = 0.45
 """Largest distance of a read's arrival from the fitted clock, in periods, for the fast path.
@@ -80,9 +80,8 @@ class DeviceClock:
         self._calm: ClockFit | None = None
         """The fitted clock if the fast path may be used; None if not.
 
-        The fast path may be used after a read that ended with a complete sample, and arrived near
-        the time that the fitted clock predicts. It is not used until ``BEAT_READS`` reads have
-        arrived.
+        The fast path may be used if ``BEAT_READS`` reads have arrived. The last read must have
+        ended with a complete sample, near the time that the fitted clock predicts.
         """
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
@@ -97,11 +96,10 @@ class DeviceClock:
         """Number of the next tick, and the earliest time in s at which the last byte of its sample
         can arrive."""
         self._cut_off: Point | None = None
-        """The tick that had an incomplete sample in the last read: its number, and the earliest
-        time in s at which the sample can be complete.
+        """The tick of the incomplete sample at the end of the last read; None if there was none.
 
-        The time is used only if the rest of the sample arrives. The value is None if the last read
-        ended with a complete sample.
+        It is the number of the tick, and the earliest time in s at which the sample can be
+        complete. The time is used only if the rest of the sample arrives.
         """
 
     @property
@@ -272,8 +270,8 @@ class DeviceClock:
 
         ``lag_s``: the delay in s. It is the tick's arrival minus its time by the fitted clock.
 
-        If the previous tick was read less than half a period earlier, the previous tick had waited
-        to be read. So the new delay replaces its delay.
+        If the previous tick was read less than half a period earlier, it had waited to be read. So
+        the new delay replaces the delay of the previous tick.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s

@@ -2,9 +2,11 @@
 
 """The two simulated Teensys and their robot, which advance in steps of a millisecond.
 
-The simulation is deterministic. Three assumptions are not in the manual. A motion command (``rc``)
-stays in effect until the next one. The front wheel does not move before the first motion command. A
-restart ends motion and subscriptions.
+The simulation is deterministic. Three assumptions are not in the manual:
+
+* A motion command (``rc``) stays in effect until the next one.
+* The front wheel does not move before the first motion command.
+* A restart ends motion and subscriptions.
 
 The module knows which Teensy is at which port, and when a fault occurs. It must not know commands.
 """

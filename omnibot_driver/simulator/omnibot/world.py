@@ -53,8 +53,8 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Force and torque are converted to one effort for each wheel, by the equations that convert a
-    velocity to wheel speeds. Each effort is added to the effort of the wheel's motor.
+    Force and torque are converted to one effort for each wheel, as a velocity is converted to wheel
+    speeds. This effort is added to that of the wheel's motor.
     """
 
     x_pwm: float = 0.0

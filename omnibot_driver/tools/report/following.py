@@ -48,8 +48,8 @@ class Answer:
 
     ``error``: for each axis, rms of measured - gain · commanded motion.
 
-    ``spread``: for each axis, ``error`` divided by the rms of the command. It is infinite if the
-    command was not constant for long enough. The gain then depends on how fast the motors react.
+    ``spread``: for each axis, ``error`` divided by the rms of the command. Infinite if the command
+    was not constant for long enough, because the gain then depends on how fast the motors react.
     """
 
     lag_s: float
@@ -72,9 +72,11 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    ``usable``: for each measurement, whether to use it. The returned delay is the one with which
-    commands and measurements fit best. The gain of an axis is taken from constant commands, if
-    there are any.
+    The returned delay is the one with which commands and measurements fit best. If the command of
+    an axis was constant for 1 s or more in all (``SUSTAINED_S``), its gain is taken from this time
+    only.
+
+    ``usable``: for each measurement, whether to use it.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)

@@ -145,9 +145,9 @@ class Log:
     def two_wheels(self) -> bool:
         """Whether the robot has two driving wheels; False without joint_states.
 
-        The report needs this to distinguish the two robots that have an IMU. The Fejemis has two
-        driving wheels, and its IMU is mounted upright. The OmniBot has three driving wheels, and
-        its IMU hangs upside down.
+        This distinguishes the two robots that have an IMU. The Fejemis has two driving wheels, and
+        its IMU is mounted upright. The OmniBot has three driving wheels, and its IMU hangs upside
+        down.
         """
         return len(self.wheels) == 2
 
