@@ -151,10 +151,9 @@ def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proof
 ) -> None:
     """The longest possible shutdown of a link is shorter than the time limit of the driver's end.
 
-    At the shutdown, the link waits for two proofs of a standstill. In this test, displacements are
-    rare, so the link waits as long as possible for each proof. The first proof comes at the last
-    moment, and the second one does not come. After the two waits, there is still time for the
-    guard's last words.
+    At the shutdown, the link waits for two proofs of a standstill. The waits are as long as
+    possible: displacements are rare, the first proof comes at the last moment, and the second one
+    does not come. After both waits, there is still time for the guard's last words.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S

@@ -254,9 +254,8 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
 ) -> None:
     """A pause begins and ends within one read. Later subscribers get the state "nominal".
 
-    The read contains a report of a pause, and then data. In the middle of the read, another thread
-    publishes the state "paused". So the driver must publish "nominal" after the read. Otherwise,
-    later subscribers would get "paused".
+    Subscribers get the last published state. While the driver processes the read, another thread
+    publishes the state "paused". So the driver must publish "nominal" after the read.
     """
     session, publishing = session_with(node)
     published: list[str] = []

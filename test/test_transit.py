@@ -288,10 +288,11 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """A sender's first message is late by 0.5 s. The second has two possible times of sending.
+    """The second message of a sender has two possible times of sending.
 
-    One time is that of the sender's clock, which is right here. The other time is 0.5 s later,
-    because the driver assumes that the first message was in time.
+    The first message was late by 0.5 s, but the driver assumes that it was in time. So the
+    estimated time of the second one is 0.5 s too late. The time by the sender's clock is right
+    here.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

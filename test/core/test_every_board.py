@@ -200,9 +200,9 @@ def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_agai
 ) -> None:
     """The driver still repeats Stop when a line that was cut carries data to the robot again.
 
-    The line is cut in both directions while the robot drives. The driver gets no proof of a stop,
-    so it repeats Stop for 5 s. After 4 s, the robot receives again, but the driver still receives
-    nothing. So the robot receives one of the last Stops.
+    The line is cut in both directions during a drive. Without a proof of a stop, the driver repeats
+    Stop for 5 s. After 4 s, the robot receives again, but the driver still receives nothing. So the
+    robot gets one of the last Stops.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False

@@ -83,11 +83,11 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board while older data is still on its way to the driver.
+    """The driver does not take an earlier pause by another program for its own pause.
 
-    The user requests a pause, too. The older data seems to show that the board runs, so the driver
-    sends P. This P resumes the board. Then the «Paused» text about the other program's pause
-    arrives. The driver does not take it for a confirmation, and sends P again.
+    The board is already paused, but the driver does not know this yet. The user requests a pause,
+    so the driver sends P, which resumes the board. Then the «Paused» text about the other program's
+    pause arrives. The driver does not take this text for a confirmation, and sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

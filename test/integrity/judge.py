@@ -15,11 +15,11 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-For each decoded frame, the judge searches forward for an equal true frame, and skips the true
-frames before it. If it skips more than ``MOST_DROPPED`` intact frames, the two frames may be equal
-by chance. So the judge also searches for the next decoded frame of the same read, after the found
-frame. If this search skips more than ``MOST_DROPPED`` intact frames too, the first decoded frame is
-wrong. If the read has no next decoded frame, the judge accepts the first one.
+The judge searches the true frames forward for one that equals the decoded frame. If it skips more
+intact frames than this number, the two frames may be equal by chance. Then the judge also searches
+for the next decoded frame of the same read, behind the found frame. If this search skips more than
+this number too, the first decoded frame is wrong. If the read has no next decoded frame, the first
+one is accepted.
 """
 REACH_BYTES = 600
 """Start of the search for the true frames that match a read. The search begins this number of

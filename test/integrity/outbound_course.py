@@ -23,10 +23,13 @@ class Understood:
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the first later write that is special, or the
-    number of writes if there is none. A write is special in three cases: it begins or ends a
-    motion; the line is still sending an earlier write; or the receiver does not understand exactly
-    the control frames in it, for example because the write contains a letter.
+    ``alike_until``: for each write, the index of the first later write that is special. If there is
+    none, it is the number of writes. A write is special in three cases:
+
+    * It begins or ends a motion.
+    * The line is still sending an earlier write.
+    * The receiver does not understand exactly the control frames in the write, for example because
+      the write contains a letter.
     """
 
     held: list[bytes]

@@ -27,8 +27,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Least number of trials for each kind of receiver and each rate of lost bytes.
 
-All scenes that end a drive share this number. There is one exception: with 1 byte in 100 lost, each
-of the three scenes in ``HURRIES`` has at least this number of trials, not only a share.
+This number is the total of all scenes that end a drive. With 1 byte in 100 lost, each of the three
+scenes in ``HURRIES`` alone has at least this number of trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"

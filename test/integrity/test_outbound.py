@@ -91,8 +91,8 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
     """A motion frame loses its last byte. The board obeys a wrong frame for less than 1.5 ms.
 
-    The first byte of the next write completes the frame. This byte is a zero, so the frame is
-    wrong. The board obeys the wrong frame only until it receives the frame of that next write.
+    The zero at the beginning of the next write completes the frame, which is therefore wrong. The
+    board obeys it until it has received the frame of the next write.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(

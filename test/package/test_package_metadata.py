@@ -53,6 +53,7 @@ PURE_MODULES = {
     "__future__",
     "abc",
     "bisect",
+    "calendar",
     "cmath",
     "collections",
     "copy",

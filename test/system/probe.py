@@ -172,9 +172,9 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again after some seconds.
 
-        If the driver has refused the message because of a stall, this stall is over by then. If the
-        driver refuses the message a second time, it logs this refusal too: it logs each kind of
-        refusal at most once in ``WARN_EVERY_S`` (s), and this time has passed.
+        If the driver has refused the message because of a stall, this stall is over by then. A
+        second refusal is logged too: the driver logs each kind of refusal at most once in
+        ``WARN_EVERY_S`` (s), and this time has passed.
         """
 
         def publish() -> None:

@@ -65,9 +65,9 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
     """An FTDI adapter's timer that never cuts a frame delays the stamps by the duration of a frame.
 
-    The timer runs exactly as fast as the board, so its phase is constant. The driver can determine
-    this phase exactly only from frames that are cut. There are none, so the delay remains. It is
-    tested after 2 s, to within 0.5 ms.
+    The driver can determine the phase of the timer exactly only from frames that are cut. Here the
+    timer runs exactly as fast as the board, and cuts none, so the delay remains. It is tested after
+    2 s, to within 0.5 ms.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within

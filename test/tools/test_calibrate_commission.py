@@ -79,9 +79,8 @@ def test_a_speed_limit_is_not_taken_for_positional_control(
 ) -> None:
     """``max_linear_speed`` is below a speed that the tool needs. The tool asks for a higher limit.
 
-    The reason: the driver would reduce the tool's fast commands to the low limit. The robot would
-    be slower than the tool expects, and the tool would conclude that the board is under positional
-    control.
+    With this limit, the driver would reduce the tool's fast commands. The robot would be too slow,
+    as if the board were under positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
         assert robot.calibrate("commission", "--only", "board") == 1

@@ -156,11 +156,11 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=3)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """The proposed gains keep the limits of Ms and overshoot.
+    """The proposed gains keep the limits of Ms (maximum sensitivity) and overshoot.
 
     Compared with the manual's gains, they reduce the error after a load change. The error after a
-    command may become larger, but not by as much. For each of the two errors, the test divides the
-    new error by the old one, and the sum of both ratios is less than 2.
+    command may become larger, but not by as much. For each of the two errors, the ratio is the new
+    error divided by the old one. The sum of the two ratios is less than 2.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

@@ -127,10 +127,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """A letter, such as S (start), is sent while the robot drives. Zeros precede the letter.
+    """After a letter, such as S (start), that is sent during a drive, the command is sent again.
 
-    The zeros may complete a frame of which the board has received only the first part. Then the
-    board obeys a wrong command. So the driver sends the right command again after the letter.
+    Zeros precede the letter. If the board has received only the first part of a frame, the zeros
+    may complete it to a wrong command. The next command corrects this.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

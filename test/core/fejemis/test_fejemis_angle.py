@@ -77,10 +77,11 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """A late driver does not blame the front board before it has read this board's port.
+    """A late driver does not blame the front board before it has read the front board's port.
 
-    The driver does nothing for 80 ms. Then it reads one port, and after that the other. Until it
-    has read the front board's port, the refusal of a command names the computer.
+    The driver does nothing for 80 ms, and then reads its two ports, one after the other. If the
+    front board's port is the second one, a command between the two reads is refused, and the
+    refusal names the computer.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}

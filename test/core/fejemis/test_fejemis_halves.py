@@ -213,10 +213,11 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
     ids: tuple[int, int], speaks: set[int], *, estop: bool
 ) -> None:
-    """One board never sends anything, or both ports lead to a drive board.
+    """If the two boards do not form a pair, the driver soon repeats Stop less often.
 
-    For up to 5 s, the driver repeats Stop. Afterwards, it tries to start the boards twice a second,
-    and sends one Stop with each try. While the e-stop is latched, it sends Stop 20 times a second.
+    One board is silent, or both are drive boards. The driver repeats Stop for up to 5 s.
+    Afterwards, it tries to start the boards twice a second, and sends one Stop with each try. While
+    the e-stop is latched, it sends Stop 20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks

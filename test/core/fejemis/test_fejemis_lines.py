@@ -334,13 +334,13 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """The decoder discards lines that do not have the learnt form, and counts them.
+    """Lines with another form than the learnt one are counted in windows of 24 lines.
 
-    It begins a new count after every 24 lines of a kind (a window). When the count reaches 8 within
-    one window, the decoder no longer checks the form of this kind of line. Here, one window ends
-    with 7 wrong lines, and the next window begins with 7 wrong lines. All 14 are discarded. The 8th
-    wrong line of the second window is accepted. ``windows``: number of earlier windows without
-    wrong lines.
+    The decoder discards them as damaged. If a window has an 8th line of this kind, the decoder no
+    longer checks the form. Here, one window ends with 7 such lines, and the next one begins with 7.
+    All 14 are discarded. Only the 8th one of the second window is accepted.
+
+    ``windows``: number of earlier windows without such lines.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

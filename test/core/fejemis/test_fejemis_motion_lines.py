@@ -115,10 +115,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
     """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
 
-    The lost characters can be the line end and the semicolon at the beginning of the next line. The
-    board then reads both lines as one. If, for example, the checksum of the next line is 92, this
-    one line begins with the motion ``rc 2 0 092``, and its checksum does not show the damage.
-    Therefore, the driver sends an empty line before such a next line.
+    A line begins with a semicolon and its checksum. Without the line end and this semicolon, the
+    board reads the two lines as one. If, for example, the next line's checksum is 92, the board
+    reads the motion ``rc 2 0 092``, and no checksum shows the damage. Therefore, the driver sends
+    an empty line before such a next line.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)

@@ -228,11 +228,11 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """A user requests everything that the driver offers. The driver then sends commands.
+    """The driver sends each command of the table as in the table's example line, or never.
 
-    It sends each command exactly as in the table's example line. Only the numbers of ``motv`` may
-    differ. The driver never sends the commands that the table marks as unused or replaced. One of
-    the unused commands is ``setid``, which can erase the board.
+    A user requests everything that the driver offers. Only the numbers of ``motv`` may differ from
+    the example line. The driver never sends the commands that the table marks as unused or
+    replaced, such as ``setid``, which can erase the board.
     """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden

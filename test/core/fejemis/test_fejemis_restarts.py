@@ -145,9 +145,9 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
     """The drive board's port is away. During this time, the board restarts and the computer stalls.
 
-    After the restart, the board's time is so small that the lines of the new connection seem late.
-    A stall of the computer also makes lines late, but this stall ended before the port was back. So
-    it cannot be the reason. The driver detects the restart, and the odometry does not jump.
+    After the restart, the board's time is small, so the lines of the new connection seem late. The
+    stall does not explain this, because it ended before the port was back. The driver detects the
+    restart, and the odometry does not jump.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)

@@ -334,12 +334,11 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
-    """The driver shuts down during a job: it was going to load the configuration.
+    """The driver is to load the configuration, and stops the robot first. Then it shuts down.
 
-    The robot still brakes for this job. The job fails, and its answer names the shutdown as the
-    reason. Before the job, the user changed a setting, but the driver has not written it to the
-    boards yet. During the shutdown, the driver does not write this setting. It only sends commands
-    to stop, and the angles of the front wheel.
+    The job of loading fails, and its answer names the shutdown as the reason. Before the job, the
+    user changed a setting. The driver has not written this setting yet, and does not write it any
+    more. It only sends commands to stop, and the angles of the front wheel.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

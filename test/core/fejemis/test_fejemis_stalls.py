@@ -58,10 +58,9 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The robot drives a curve while the driver stalls. The odometry contains this whole motion.
 
-    No line of the boards is lost. In some of the cases, the driver does not notice the stall. It
-    then rejects lines that are more than 1 s late, but the first displacement after the stall also
-    covers the time of the rejected lines. So the first displacement covers seconds, and the second
-    one covers 20 ms. The driver regards neither of these two displacements as implausible.
+    If the driver does not notice the stall, it rejects lines that are more than 1 s late. The first
+    displacement after the stall then also covers the time of these lines, so it covers seconds. The
+    next one covers 20 ms. The driver regards neither of the two as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -101,9 +100,8 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """The driver needs long for the first read after a stall, so the second read is late too.
 
-    Bytes are lost between the two reads. One sample arrives after the lost bytes and before the
-    next pose. This pose shows that lines are missing, so the driver does not publish the sample.
-    All other samples get the times at which the board took them.
+    Bytes are lost between the two reads, which the next pose shows. A sample between the lost bytes
+    and this pose is not published. All other samples get the times at which the board took them.
     """
     bench = nominal()
     bench.run(1.0)

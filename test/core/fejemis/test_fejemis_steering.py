@@ -254,11 +254,12 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
-    """The motion monitor has stopped the robot twice, so the driver refuses motion commands.
+    """A reverse command that the driver has limited to zero is not driven later.
 
-    A node repeats the command -0.3 m/s. While ``allow_reverse`` is off, the driver reduces it to
-    zero, and accepts the zero, because it is not a motion. Then the user sets ``allow_reverse``.
-    The robot stays at rest, and the driver refuses the node's next command.
+    The motion monitor has stopped the robot twice, so motion is refused until ~/start. A node
+    repeats the command -0.3 m/s. While ``allow_reverse`` is off, the driver limits this command to
+    zero, and accepts it. Then the user sets ``allow_reverse``. The robot stays at rest, and the
+    node's next command is refused.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

@@ -63,9 +63,9 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """The odometry detects that a wheel was at rest before the driver started it again.
 
-    The driver commands 7 RPM backward, but the board keeps reporting 12 RPM for this wheel. The
-    reported speed of a rolling wheel would fall to 7 RPM. So this wheel is at rest, and the
-    odometry takes back the distance that it has added since the reported speed last changed.
+    The driver commands 7 RPM backward, but the board keeps reporting 12 RPM. A rolling wheel would
+    have slowed down to 7 RPM, so this wheel is at rest. The odometry subtracts the distance that it
+    has added since the reported speed last changed.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -87,9 +87,8 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
     """The driver does not take a wrong heading of the board for a sign that a resting wheel rolls.
 
-    In a turn, the wheel that turns backward stops, and the driver detects this. But the board still
-    computes its heading from the old speed of this wheel. So the board's heading differs from the
-    driver's heading. The driver must not explain the difference by a rolling wheel.
+    In a turn, the wheel that turns backward stops, and the driver detects this. The board still
+    computes its heading from the old speed of this wheel, so the board's heading becomes wrong.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)

@@ -112,9 +112,8 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """After a jump of the board's clock, the delay of the next tick report is irregular.
 
-    All reads are on time. Before the jump, the estimated delay is about 0, and it is not irregular.
-    Then the board's clock jumps by 0.05 s or 0.2 s, ahead or back. The estimated delay of the next
-    report differs from 0 by the same amount, and it is irregular.
+    All reads are on time, so the estimated delay is about 0 and regular before the jump. The clock
+    jumps by 0.05 s or 0.2 s, ahead or back. The next delay differs from 0 by the same amount.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

@@ -181,9 +181,10 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    The robot drives at 30 RPM and is stopped. The firmware keeps the last measured speed until it
-    receives RPM 0/0. The driver would send RPM 0/0 before the next set-point. But this test writes
-    a set-point of 8 RPM directly to the board. Without feed-forward, it does not start the wheels.
+    The robot drives backward at 30 RPM and is stopped. The test then writes 8 RPM backward directly
+    to the board, without the RPM 0/0 that the driver would send first. The firmware still uses the
+    last measured speed, which is higher than 8 RPM. Without feed-forward, the wheels then get no
+    power.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -245,9 +246,9 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
     """While a board with the public firmware sends a record, its clock stops for 0.12 s.
 
-    After the record, the tick reports seem late by this clock. The driver takes the stop of the
-    clock into account, even if lines of the record are lost. So it does not regard these reports
-    as read late. Otherwise, ``odom`` would jump some seconds later.
+    By this clock, the tick reports after the record seem late. The driver takes the stop of the
+    clock into account, even if lines of the record are lost. Otherwise, ``odom`` would jump some
+    seconds later.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)

@@ -133,9 +133,9 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 ) -> None:
     """In a drive backward, reports are lost for 0.9 s.
 
-    In this gap, the wheels may change their speeds. So the standard deviation of the heading grows
-    more than without a gap. If the speed of a wheel went up and down before the gap, it grows even
-    more.
+    The wheels may change their speeds in this gap, so the standard deviation of the heading grows
+    more than without a gap. If the speed of a wheel went up and down before the gap, the standard
+    deviation grows even more.
     """
 
     def grown_deg(gap_s: float) -> float:

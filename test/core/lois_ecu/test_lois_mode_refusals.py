@@ -92,9 +92,9 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
     """A terminal mode that is taken back does not end the stop that a new drive mode needs.
 
-    The user changes the drive mode, sets a terminal mode, and takes the terminal mode back. The
-    driver continues to stop the robot, because the new drive mode can begin only when the robot has
-    been stopped. Until then, refusals name only the drive mode, and no longer the terminal mode.
+    The user changes the drive mode, sets a terminal mode, and takes the terminal mode back. The new
+    drive mode can begin only at rest, so the driver continues to stop the robot. Until the robot is
+    stopped, refusals name only the drive mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

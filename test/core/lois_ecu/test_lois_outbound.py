@@ -106,11 +106,11 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """A motion line and an LED line follow each other. A run of adjacent characters is lost.
+    """A motion line and an LED line lose adjacent characters: exactly the length of one line.
 
-    The run is exactly as long as a line. If the motion line comes first, the remaining characters
-    may be a wrong motion line. To prevent this, the driver sends the LED line at least 15 ms after
-    a motion line. If the LED line comes first, there is no danger.
+    If the motion line comes first, the remaining characters may be a wrong motion line. Therefore,
+    the driver sends an LED line at least 15 ms after a motion line. If the LED line comes first,
+    there is no danger.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

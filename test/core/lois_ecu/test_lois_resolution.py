@@ -166,9 +166,8 @@ def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
 def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
     """A read is late by 2 s. In its last report, the clock (in ns) and the counts are near zero.
 
-    So the board may have restarted before it sent this report. Therefore, the clock values do not
-    show when the reports were sent. The driver uses the time of the read as the arrival time of all
-    reports.
+    The board may have restarted before this report, so the clock does not show when the reports
+    were sent. The driver uses the time of the read for all of them.
     """
     late_reads = LateReads(per_turn)
     for number in range(6):
@@ -196,10 +195,9 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
     """The user sets a new resolution while the driver waits for the result of a reset.
 
-    After the reset, a wheel rolls on by 250 ticks. The driver uses the new resolution. By this
-    resolution, 250 ticks are a quarter turn. The count is therefore near zero, and proves the
-    reset. By the old resolution, 250 ticks would be more than four turns, and the count would prove
-    nothing.
+    After the reset, a wheel rolls on by 250 ticks. By the new resolution, this is a quarter turn: a
+    count near zero, which proves the reset. By the old resolution, it would be more than four
+    turns, and prove nothing. The driver uses the new resolution.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

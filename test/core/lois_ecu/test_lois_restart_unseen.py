@@ -70,9 +70,9 @@ def test_a_restart_shows_although_the_clock_wraps_at_that_time(
 ) -> None:
     """The driver notices a restart, although the board's clock wraps at about the same time.
 
-    After the restart, the clock begins at zero. Without the restart, it would be near zero too, so
-    the clock alone does not show the restart. The board has also lost its tick counts. The odometry
-    does not take their loss for a motion backward.
+    After a restart and after a wrap, the clock is near zero, so the clock alone does not show the
+    restart. The tick counts also begin at zero. The odometry does not take this for a motion
+    backward.
     """
     bench = Bench("documented")
     begin_drive(bench, speed_mps, 2.4, wrapped_for_s)
@@ -128,9 +128,10 @@ def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: floa
     """The driver does not take wheels that roll back for a restart of the board.
 
     The robot drives forward, and then backward until its tick counts are about zero. At this
-    moment, the board's clock wraps. So clock and counts are the same as after a restart. In the
-    second case of the test, a read is also late, so the clock does not fit the arrival times. In
-    both cases, the driver assumes no restart.
+    moment, the board's clock wraps. So clock and counts are the same as after a restart.
+
+    ``late_s``: delay of a read at this time, in s. With a delay, the clock does not fit the arrival
+    times.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6

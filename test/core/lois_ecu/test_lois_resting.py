@@ -109,9 +109,9 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
     """Most reports are lost. In the reports that arrive, the speed falls from 25 to 9 RPM in 1 s.
 
-    Usually, a fall that takes 1 s is too slow to count. But a report arrives only every 0.5 s, so
-    the true fall may have been faster. So the fall counts, and repeated reports of 9 RPM prove that
-    the wheel is at rest.
+    A fall that takes 1 s is usually too slow for a wheel that comes to rest. But a report arrives
+    only every 0.5 s, so the true fall may have been faster. Repeated reports of 9 RPM therefore
+    prove that the wheel is at rest.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
@@ -131,9 +131,9 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """Most reports are lost. In the reports that arrive, the speed never falls: it rises to 14 RPM.
 
-    Still, the speed may have fallen in a gap, as it does before a wheel comes to rest. So if the
-    board then reports 14 RPM many times, the wheel is at rest. If no reports were lost, there was
-    no fall, and the same reports show that the wheel rolls.
+    The speed may have fallen in a gap, as it does before a wheel comes to rest. Therefore, many
+    reports of 14 RPM prove that the wheel is at rest. Without gaps, there was no fall, and the same
+    reports show that the wheel rolls.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

@@ -113,9 +113,9 @@ def test_false_headings_at_north_are_refused() -> None:
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
     """The odometry is reset while the compass shows 120°. Later headings of 120° are accepted.
 
-    A board that faces north may falsely report 120°, so the driver rejects 120° while it expects a
-    heading near north. Here it expects 120°, before and after the reset: the reset sets the yaw to
-    zero, but does not change the expected heading.
+    A board that faces north may falsely report 120°, so the driver rejects 120° while it expects
+    north. Here it expects 120°. The reset sets the yaw to zero, but does not change the heading
+    that the driver expects.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

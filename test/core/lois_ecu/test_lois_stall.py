@@ -130,11 +130,11 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a wheel can roll at a constant speed above its set-point.
+    """With feed-forward, a wheel at a constant speed above its set-point does not look stalled.
 
-    Without feed-forward, such a wheel would get no power and become slower. If its reported speed
-    is constant nevertheless, the wheel is at rest. With feed-forward, a constant speed shows this
-    only if the other wheel's speed changes meanwhile.
+    Without feed-forward, the controller would give no power at such a speed, and a rolling wheel
+    would become slower. With feed-forward, a constant speed shows a wheel at rest only if the other
+    wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)

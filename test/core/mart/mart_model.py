@@ -290,8 +290,8 @@ def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     ``late``: whether the reply is late, so that it may belong to an earlier command.
 
     A late reply is never taken for the answer to a check, a controlled move or MSM. The server
-    needs more time for a check or a move than a reply can be late. So when the answer to a check or
-    a move comes, all late replies to earlier commands have arrived.
+    needs more time for a check or a move than a reply can be late. So all late replies to earlier
+    commands arrive before the answer to a check or a move.
     """
     driver = world.driver
     state = driver.state

@@ -49,8 +49,8 @@ not counted.
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
 
-The driver checks the IMU shortly before it starts a motion. If the start comes later than this
-time, the check came after the failure, so the start is a fault of the driver.
+The driver checks the IMU shortly before each start. A start after this time is a fault of the
+driver, because its check should have found the failure.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""

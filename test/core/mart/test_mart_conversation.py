@@ -224,11 +224,11 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """The driver sends a start, then a first stop, then a second stop.
+    """Only a reply that cannot be the copy of an earlier reply proves a stop.
 
-    The first stop may arrive before the start, so the reply to it proves nothing. A copy of this
-    reply may arrive until 0.6 s after the first stop. So only a reply after this time proves a
-    stop.
+    The driver sends a start, then two stops. The first stop may arrive before the start, so its
+    reply proves nothing. A copy of this reply may arrive until 0.6 s after the first stop. A later
+    reply proves a stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)

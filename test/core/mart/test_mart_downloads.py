@@ -208,9 +208,9 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The log can still be downloaded after the reply to a stop was lost.
 
-    The driver repeats the stop, and the server replies that there is no motion. A restarted server
-    would reply the same, and it would have lost its log. But it would also report a heading of
-    zero. This server does not, so the driver knows that it was not restarted.
+    The driver repeats the stop, and the server replies that there is no motion. A restarted server,
+    which has lost its log, would give the same reply. But it would also report a heading of zero,
+    and this server does not. So the driver knows that there was no restart.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success

@@ -103,9 +103,9 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """A motor is stuck, so the turn towards a goal does not begin. The driver discards the goal.
 
-    The server reports the failure "start timedout". It also reports this failure if the motors are
-    intact, but a heavy robot still moves some time after a turn. After such a turn, the driver
-    continues to the goal. So the failure alone is not a reason to discard a goal.
+    The server reports the failure "start timedout". This failure alone is not a reason to discard a
+    goal: the server also reports it if a heavy robot still moves some time after a turn. In that
+    case, the driver continues to the goal.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -119,9 +119,8 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
     """An obstacle ends a move early. The driver does not make a later move longer.
 
     The robot is heavy, so the server's reply to this move reports only a slow stop. The reply to
-    the next move reports the obstacle. So the driver knows that the obstacle made the first move
-    too short, and learns nothing from its distance. For a later goal, it requests the usual
-    distance.
+    the next move reports the obstacle. So the driver learns nothing from the distance of the short
+    move. For a later goal, it requests the usual distance.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -146,10 +145,9 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn has a wrong rate, so the driver stops it and starts it again, with other motor units.
 
-    For the new units, the driver needs the speed of the motors. It measures this speed by the
-    encoder, because the reply to the stop gives no angle. The reply gives no angle for one of two
-    reasons, and the test has a variant for each: the stop takes too long, or the reply comes too
-    late.
+    To choose the units, the driver needs the speed of the motors. It measures this speed by the
+    encoder, because it gets no angle in the reply to the stop: a heavy robot stops too slowly, or
+    the network delays the reply too long.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

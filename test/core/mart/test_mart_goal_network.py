@@ -149,11 +149,11 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 
 
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
-    """The robot drives half as far as requested. Queries are lost for 0.7 s after the move.
+    """A first move that is too short is not taken for an incomplete second run.
 
-    A second run is possible, so the driver sends a stop command. But the driver has not learned how
-    far this robot drives in one run. So the short distance does not show a second run, and the
-    driver adds nothing to the pose.
+    The robot drives half as far as requested. Then queries are lost for 0.7 s, so a second run is
+    possible, and the driver sends a stop. But the driver has not learned how far this robot drives
+    in one run. So the short distance proves no second run, and nothing is added to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -175,10 +175,10 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
-    """The reply to each turn is lost. The driver sends a stop, and the server answers "no motion".
+    """The reply to each turn is lost, so the driver sends a stop. The server answers "no motion".
 
-    The answer shows that the turn was completed. The encoder count began at zero with the turn. So
-    the odometry must not subtract the last count of the drive before the turn.
+    The answer shows that the turn was completed. The encoder counts each turn from zero, so the
+    odometry must not subtract the last count of the drive before the turn.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -197,8 +197,9 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
     """After a turn, the driver reads only the encoder, then begins the next straight move.
 
-    After the straight move, the driver reads a heading again, which contains the turn. The odometry
-    has already counted the turn by the encoder, so it does not add the turn again.
+    The odometry counts the turn by the encoder. The driver reads the next heading after the
+    straight move. This heading also contains the turn, but the odometry does not add the turn
+    again.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))
@@ -231,10 +232,10 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
-    """No reply arrives for 0.3 s after a turn. A copy of the turn may be running.
+    """No reply arrives for 0.3 s after a turn, so a copy of the turn may be running.
 
-    So the driver sends a stop. The encoder then shows the complete turn, which is more than a copy
-    could have turned before the stop. So there was no copy, and the driver continues to the goal.
+    The driver sends a stop. The encoder then shows a complete turn. A copy could not have turned as
+    far before the stop, so there was no copy, and the driver continues to the goal.
     """
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot

@@ -64,9 +64,9 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
     """At the end of a turn, the stop overtakes an encoder query.
 
-    So the reply to the stop, which contains the angle, comes before the encoder count. The driver
-    does not use the count as the angle, because the count is far from the expected angle. The
-    driver also does not learn the motors' speed from the count.
+    So the reply to the stop, which is the angle, comes before the encoder count. The count is far
+    from the expected angle. The driver does not use it as the angle, and does not learn the motors'
+    speed from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -149,10 +149,9 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """The robot drives to a goal, and all replies come 0.28 s late.
 
-    The network may have duplicated the request of a move. The robot would then move a second time,
-    so the driver sends a stop after each move. A server without a duplicate has nothing to stop,
-    and answers sooner than a server that stops a duplicate. The driver then continues, and the
-    robot reaches the goal.
+    After each move, the driver sends a stop, because the network may have duplicated the request of
+    the move. A server without a duplicate has nothing to stop, and answers sooner than a server
+    that stops a second run. After such a quick answer, the driver continues to the goal.
 
     ``copied``: whether the network duplicates the request. If so, the driver reports it, and adds
     the first run to the odometry.
@@ -178,9 +177,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     """A late reply to a start arrives after a stop. It is not taken for the reply to the stop.
 
-    The driver checks the IMU, and then starts a backward drive. It mistakes a copy of the check's
-    ``ok`` for the reply to the start. It then sends a stop, which is lost. After that, the true
-    reply to the start arrives.
+    The driver mistakes a copy of the IMU check's ``ok`` for the reply to the start of a backward
+    drive. The true reply to this start is still on its way. The driver sends a stop, which is lost,
+    and then the true reply arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

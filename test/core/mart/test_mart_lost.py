@@ -46,10 +46,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """The IMU dies in a motion and works again later, but the server's stop port stays hung.
 
-    The driver refuses motion until the server is restarted. Then the network fails for a time.
-    Meanwhile, the heading changes, because it drifts or because a user turns the robot by hand. A
-    restart sets the heading to zero, but another change of the heading does not show a restart. So
-    the driver still refuses motion.
+    The driver refuses motion until the server is restarted. The network fails for a time, and
+    meanwhile the heading changes, by drift or because a user turns the robot by hand. A restart
+    would set the heading to zero. So this change does not show a restart, and the driver still
+    refuses motion.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -75,9 +75,9 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 ) -> None:
     """The IMU dies in a motion, so the server hangs when the driver commands a stop.
 
-    The driver uses the stop port, which then hangs. When the IMU works again, the server answers
-    all waiting requests at once, and the network reorders the replies. The driver refuses motion,
-    even if the server's name arrives before the reply to the stop command.
+    The driver uses the stop port, which then hangs too. When the IMU works again, the server
+    answers all waiting requests at once, and the network reorders the replies. The driver refuses
+    motion, even if the server's name arrives before the reply to the stop command.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -138,9 +138,9 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
     """The server's process is stopped while the robot is at rest, and continues after 5 s.
 
     In these 5 s, the driver gets no replies, so it sends stop commands to the stop port. Then the
-    server answers the queries that have waited. A reply to a stop command would show that the stop
-    port may hang, and the driver would refuse motion. The driver does not take the late replies for
-    such a reply. So it accepts the next command, and the robot drives.
+    server answers the queries that have waited. The driver does not take these answers for the
+    reply to a stop command, which would show that the stop port may hang. So the driver accepts the
+    next command, and the robot drives.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

@@ -22,14 +22,14 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(8))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """One fault happens in each trial: a datagram is lost, late or doubled, or the IMU dies.
+    """Each trial has one fault: a datagram is lost, late or doubled, or the IMU dies.
 
-    If a datagram has a fault, the server does not hang, and the robot is at rest at the end. If the
-    IMU dies, no motion begins more than 0.25 s later. At the end of such a trial, the robot is at
-    rest, or the driver has reported that it has lost the server.
+    If a datagram has the fault, the server does not hang, and the robot is at rest at the end. If
+    the IMU dies, no motion begins more than 0.25 s later. At the end, the robot is at rest, or the
+    driver has reported that it has lost the server.
 
-    Each seed is one trial. In a trial, the user makes two requests (``WISHES``), one after the
-    other. The eight seeds include each fault, and each kind of request as the first of the two.
+    In a trial, the user makes two requests (``WISHES``). The eight seeds include each fault, and
+    each kind of request as the first one.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))

@@ -316,10 +316,10 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """The server restarts in a drive. It has no MCS, and the network is bad.
+    """The server restarts in a drive, and the motors run on. It has no MCS, and the network is bad.
 
-    The driver needs some time to see the motion between two encoder counts. It then stops the
-    robot by a turn of 1 degree, however long ago the stops found no motion.
+    The encoder counts that show the motion may come long after the stops, which find no motion. The
+    driver then still stops the robot, by a turn of 1 degree.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()

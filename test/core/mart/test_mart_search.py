@@ -147,9 +147,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    While the server's command port is silent, the server shows neither its motion nor why the port
-    is silent. The function then replaces the motion, the reason (``port``) and ``released`` by
-    fixed values.
+    While the command port is silent, neither the motion nor the reason for the silence (``port``)
+    can be observed. The function then sets the motion, ``port`` and ``released`` to fixed values.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

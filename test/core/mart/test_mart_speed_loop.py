@@ -40,11 +40,9 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 ) -> None:
     """If a motor is faster than the driver expects, the driver must not expect less afterwards.
 
-    The driver measures the speed at 18 units, which is right, and at 26 units, which is too low.
-    The straight line through both points has a speed above zero at zero units, which is impossible.
-    So the driver uses another line, which does not have this error. On this line, the speed at 14
-    units is too low. Then the driver measures the true speed at 14 units. After this, the speed at
-    14 units on the line must not be lower than before.
+    The driver first measures the true speed at 18 units, and a speed that is too low at 26 units.
+    The learnt line cannot have a positive speed at zero units, so its speed at 14 units is then too
+    low as well. The measurement of the true speed at 14 units must not lower the line there.
     """
     line = MotorLine()
     for _ in range(8):
@@ -129,9 +127,9 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
     """If a start does not move the robot, the next start uses three times as many motor units.
 
-    Such an increase ends at 20 units. If a start with 30 units does not move the robot, the wheels
-    are regarded as blocked. This changes nothing: the next start still has at least 20, but fewer
-    than 30 units.
+    The increase ends at 20 units, because 20 units move every robot that is not blocked. So a start
+    with 30 units that does not move the robot raises nothing: the next start still has at least 20,
+    but fewer than 30 units.
     """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4

@@ -128,9 +128,9 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
     """The driver sends MSM only when no late copy of MCS can arrive any more.
 
-    MCS begins the direct control of the motors, and MSM ends it. The reply to the first MCS is
-    lost, so the driver repeats MCS. The network delivers a late copy of the second MCS. If this
-    copy arrived after MSM, it would begin the direct control again.
+    MCS begins the direct control of the motors, and MSM ends it. A copy of MCS after MSM would
+    begin the direct control again. Here, the reply to the first MCS is lost, so the driver repeats
+    MCS, and the network delivers a late copy of the second one.
     """
     bench = creeping()
     since = len(bench.written)
@@ -169,8 +169,8 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
 ) -> None:
     """If the start of a motion is lost, the driver still switches off a motor that is left on.
 
-    After a straight move, a motor is on. A motion that begins would set this motor anew, but the
-    server does not receive its start. After the user's stop, the driver switches the motor off.
+    A straight move has left a motor on. The next motion would set this motor anew, but its start
+    does not reach the server. After the user's stop, the driver switches the motor off.
     """
     bench = creeping()
     lost = drops(bench.robot.network[0].to_board, lambda data: data.startswith(word))
@@ -341,10 +341,10 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
     """The driver does not take a second copy of the reply to MSM for the reply to RST IMU.
 
-    The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM. The
-    server's reply ``ok`` to MSM arrives twice, and the driver's next RST IMU (check of the IMU) is
-    lost. The driver does not conclude from the second ``ok`` that SRM is safe again. It gives a
-    notice: the server still reports a motion although the robot is at rest.
+    The stop port has ended a forward drive, and SRM (a stop) would hang the server. The driver
+    sends MSM, then RST IMU (check of the IMU). An ``ok`` to RST IMU would show that SRM is safe
+    again. RST IMU is lost, but the ``ok`` to MSM arrives twice. The driver does not send SRM. It
+    gives a notice: the server still reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -222,8 +222,8 @@ def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
 ) -> None:
     """The network duplicates the driver's own request for a record (LAST TURN).
 
-    So the server sends the record a second time, later. Before the driver sends the user's request,
-    ~/download_last_move, it waits until such late replies can no longer arrive. So the user gets
+    So the server sends this record a second time, later. The driver waits until such late replies
+    can no longer arrive, and then sends the user's request (~/download_last_move). The user gets
     the right file.
     """
     bench = MartBench("source").ready()

@@ -66,9 +66,8 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
     """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
 
-    This distance may be up to 20 mm too long, but never too short. It can be too long because the
-    first displacement after the reset also contains motion from before the reset. The board had not
-    reported this motion yet.
+    This distance may be up to 20 mm too long, but never too short: the first displacement after the
+    reset also contains motion from before it, which the board had not reported yet.
     """
     for _ in range(10):
         bench.drive(0.5)
@@ -89,8 +88,8 @@ def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_clos
 ) -> None:
     """While no data arrives, or the port is closed, a reset of the odometry is refused.
 
-    The robot may be pushed in this time, as here, and later data will show this motion. If the
-    reset were accepted, odom would not stay at zero. When data arrives again, the reset succeeds.
+    The robot is pushed in this time, and later data will show this motion. So odom would not stay
+    at zero after a reset. When data arrives again, a reset succeeds.
     """
     bench.speaks = False
     bench.run(2.0)

@@ -258,9 +258,9 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
     """A driven robot drives on, because it has not received Stop.
 
-    The monitor reports a fault every 5 s, and the driver sends Stop for each fault, because a later
-    Stop may arrive. The time from one fault to the next does not become longer. It would become
-    longer for a pushed robot that has obeyed Stop.
+    The monitor reports a fault every 5 s, and the driver sends Stop each time, because a later Stop
+    may arrive. This period does not become longer, as it would for a pushed robot that has obeyed
+    Stop.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -299,11 +299,11 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """A board corrects its own odometry. Four impossible displacements in a row are a fault.
+    """Four impossible displacements in a row are a fault.
 
-    The outlier filter does not reject such displacements, because up to three in a row may be a
-    correction. After a possible displacement, the monitor counts from zero again. While the robot
-    rolls out after the fault, the monitor reports no second fault.
+    Up to three in a row may be a correction of the board's own odometry, so the outlier filter does
+    not reject them. After a possible displacement, the monitor counts from zero again. While the
+    robot rolls out after the fault, the monitor reports no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)

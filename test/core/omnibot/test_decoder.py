@@ -160,8 +160,8 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
     """The end of an IMU frame, FF FB or FF FC, could also be the header of the next frame.
 
-    If a delta is due in this tick, the decoder waits for more bytes. In all other ticks, it returns
-    the IMU frame at once. The pauses between the ticks (10 ms) tell the decoder in which ticks a
+    The decoder waits for more bytes only in ticks in which a delta is due. In all other ticks, it
+    returns the IMU frame at once. The pauses between the ticks show the decoder in which ticks a
     delta is due.
     """
     made, waited = FrameDecoder(), []

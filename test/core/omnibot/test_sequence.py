@@ -41,10 +41,10 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The board is paused, and then continues with the next count. No delta is counted as lost.
+    """After a pause, the board continues with the next count. No delta is counted as lost.
 
-    The duration of this delta is unknown. A count of 0 (after 255) is a special case: a restarted
-    board begins at 0, so the driver assumes a restart.
+    The duration of the delta with this count is unknown. If the count is 0 (after 255), the driver
+    assumes a restart, because a restarted board begins at 0.
     """
     sequence = begun(count)
     sequence.pause()

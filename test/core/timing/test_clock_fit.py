@@ -17,9 +17,9 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: functions of the number of a tick. ``above`` returns how far the upper
-    bound of the tick's time is after the true time, in s. ``below`` returns the same for the lower
-    bound. It is negative if the bound is before the true time.
+    ``above``, ``below``: functions of the number of a tick. ``above`` returns the upper bound of
+    the tick's time minus the true time, in s. ``below`` returns the lower bound minus the true
+    time.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
