@@ -80,7 +80,7 @@ class PseudoTerminal:
     def wait_for(self, text: str) -> None:
         """Wait until the program draws ``text``.
 
-        Only output that follows the text of the previous call is searched.
+        The search begins after the text that the previous call found.
         """
         with self._changed:
             found = self._changed.wait_for(lambda: text.encode() in self._drawn, PATIENCE_S)

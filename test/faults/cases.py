@@ -280,9 +280,9 @@ COMMANDS: Final[dict[str, Case[Rig]]] = {
     "1,000 commands a second": flood_of_commands,
 }
 LINE: Final[dict[str, Case[Rig]]] = {
-    "the cable is cut, to the board": cut_to_the_board,
-    "the cable is cut, from the board": cut_from_the_board,
-    "the cable is cut, both ways": cut_both_ways,
+    "the wire to the board is cut": cut_to_the_board,
+    "the wire from the board is cut": cut_from_the_board,
+    "both wires of the cable are cut": cut_both_ways,
     "the board reboots": board_reboots,
     "the board reboots while commands continue": board_reboots_while_somebody_drives_on,
     "unplugged, plugged in under another name": unplugged,

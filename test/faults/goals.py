@@ -109,8 +109,8 @@ def ended(number: signal.Signals, rig: GoalRig) -> None:
 GOALS: Final[dict[str, Callable[[GoalRig], None]]] = {
     f"a goal, and {name}": partial(discards, event, allowed_s)
     for name, event, allowed_s in (
-        ("the cable is cut, from the board", cut_from_the_board, UNHEARD_S),
-        ("the cable is cut, both ways", cut_both_ways, TIMEOUT_S),
+        ("the wire from the board is cut", cut_from_the_board, UNHEARD_S),
+        ("both wires of the cable are cut", cut_both_ways, TIMEOUT_S),
         ("unplugged, plugged in", unplugged, 2.0),
         ("the kernel's buffer is full", full_port, 0.0),
         ("the board reboots", reboot, 0.0),

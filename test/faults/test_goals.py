@@ -12,7 +12,7 @@ from other_rigs import GoalRig
 from walk import walk
 
 SOME_GOALS = (
-    "a goal, and the cable is cut, from the board",
+    "a goal, and the wire from the board is cut",
     "a goal, and unplugged, plugged in",
     "a goal, and the kernel's buffer is full",
     "a goal, and e-stop and release",

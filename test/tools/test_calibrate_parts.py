@@ -125,7 +125,7 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """``stairs`` returns one command after the other, each for the duration of this command.
+    """``stairs`` returns the commands one after the other. Each lasts for its own duration.
 
     After the last command, it returns None, which ends the motion.
     """

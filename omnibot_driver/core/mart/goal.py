@@ -167,7 +167,7 @@ class Move:
         self.said = self.turns = 0
 
     def begin(self, request: Request) -> None:
-        """Count the move that ``request`` begins."""
+        """Count a new move, which ``request`` commands. Also count the turns in a row."""
         self.said += 1
         self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 

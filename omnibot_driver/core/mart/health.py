@@ -42,7 +42,10 @@ ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """Largest difference between two readings that are regarded as equal, in V (VOLTS) or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of readings in a row that must be equal if a reply may be that to another query."""
+"""Number of equal readings in a row that the driver requires if it is uncertain of the query.
+
+It is uncertain if the reply may answer another query.
+"""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0

@@ -61,8 +61,8 @@ class RelativeHeading:
         self._turned_rad = 0.0
         self.same = 0
         self.may_begin_anew = False
-        """Whether the server may have restarted. If so, the next heading may be zero for this
-        reason."""
+        """Whether the server may have restarted. A restarted server begins its heading at zero
+        again."""
         self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 

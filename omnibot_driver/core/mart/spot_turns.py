@@ -273,13 +273,13 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from the previous turn, if it was slow and this turn is fast.
+        """Undo what was learned from a slow turn if the next turn is fast.
 
-        In this case, something has held the robot in the slow turn. If this turn is slow, something
-        may hold the robot now. So the present knowledge is stored, and the next call restores it if
-        the next turn is fast.
+        Something has then held the robot in the slow turn. The caller calls this method before the
+        driver learns from a turn. At a slow turn, the method stores what the driver knows. If the
+        next turn is fast, the method restores that.
 
-        ``part``: this turn's measured rate divided by its commanded rate.
+        ``part``: the turn's measured rate divided by its commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
             # otherwise the driver would learn from both turns a dead zone that does not exist
