@@ -36,7 +36,7 @@ def obeying(
     * ``may_be_old``: returns True for a message whose time in transit does not matter.
     * ``is_stop``: returns True for a command to stop.
     * ``ends_goal``: returns True for a command that ends a drive to a goal even if the command is
-      refused. Raises CommandRefused for some invalid messages.
+      refused. May raise CommandRefused for an invalid message.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()

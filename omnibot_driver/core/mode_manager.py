@@ -20,7 +20,7 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Time in s of uninterrupted data after which the driver repeats a command to pause or to reset.
+"""Time in s for which the board must send data before a command to pause or to reset is repeated.
 
 A paused board sends a «Paused» text every second. If the board sends only data for this time, the
 command was lost.

@@ -49,9 +49,9 @@ class Interlocks:
     def refused(self, now: float) -> None:
         """Record that a motion command was refused, by this class or by another one.
 
-        Call this method for every refused command. After a stop by the motion monitor, motion is
-        refused until no command has arrived for some time. Each refused command restarts this time,
-        because its sender is still active.
+        Call this method for every refused command. After a first stop by the motion monitor, motion
+        is refused until no command has arrived for some time. Each refused command restarts this
+        time, because its sender is still active.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 
@@ -93,8 +93,8 @@ class Interlocks:
     def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
-        While the board is silent, a reset is refused. The next data could contain motion from
-        before the reset, and this motion would be added to the new pose.
+        While the board is silent, a reset is refused, because the next data could contain motion
+        from before the reset. This motion would wrongly be added to the new pose.
         """
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN

@@ -57,8 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        After the monitor's first stop, the release changes nothing. After its second stop within 60
-        s, the release allows motion again if the board has no ~/start; otherwise, only ~/start
+        After the monitor's first stop, the release changes nothing. After its second stop within
+        60 s, the release allows motion again if the board has no ~/start; otherwise, only ~/start
         allows it.
         """
         if self.until is Until.ESTOP:

@@ -147,8 +147,9 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: value of ``Odometry.alignments`` at the time of the command. If that value has
-      changed since then, ``place`` is wrong, and the goal is discarded.
+    * ``alignment``: value of ``Odometry.alignments`` at the time of the command. If
+      ``Odometry.alignments`` has changed since then, the relation of the two frames has changed, so
+      ``place`` is wrong, and the goal is discarded.
     * ``check``: function that raises CommandRefused if the order to drive to ``place`` cannot be
       encoded.
     * ``direct``: whether the board drives straight to the goal.

@@ -38,7 +38,7 @@ PROOFS: Final = 2.0
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-The driver takes the duration of the newest displacement for the period. After a loss, this duration
+The driver uses the duration of the newest displacement as the period. After a loss, this duration
 also includes the lost displacements, so it is limited to ``RAREST_S``.
 """
 UNDER_WAY_S: Final = 0.05

@@ -38,9 +38,10 @@ EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
 DIGIT: Final = 6e-4
-"""``NEAR``, ``DIGIT``: tolerances between a number that was written to the board and the number
-that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute, and the larger one applies: the
-board prints few digits, so the relative error of a small number can be above ``NEAR``."""
+"""``NEAR``, ``DIGIT``: tolerances for the difference between a number that was written to the board
+and the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute, and the larger
+one applies: the board prints few digits, so the relative error of a small number can be above
+``NEAR``."""
 HALF: Final = 0.51
 """Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last digit that the
 board prints. It is half a unit for the rounding of a printed number, and a little more, because the

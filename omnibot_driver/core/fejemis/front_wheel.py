@@ -21,8 +21,8 @@ FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Tolerance, in degrees, for the change from the last accepted angle to a new one.
 
-The limit of the change is this tolerance, plus the angle by which the wheel can turn since the last
-accepted one at its highest speed (``FASTEST_DEGPS``).
+The limit of the change is this tolerance, plus the angle by which the wheel can have turned in the
+meantime at its highest speed (``FASTEST_DEGPS``).
 """
 BITS: Final = (
     (10, False, "broken Hall element"),

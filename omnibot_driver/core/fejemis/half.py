@@ -122,8 +122,9 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        So the caller must not collect the messages first: a message that shows a restart deletes
-        the board's earlier times, and the caller needs these times for the messages before it.
+        The caller must not collect the messages first. If a message shows a restart, the half
+        deletes the board's earlier times, but the caller needs them for the messages before the
+        restart.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

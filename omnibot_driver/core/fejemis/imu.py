@@ -36,8 +36,8 @@ BLOCK: Final = 100
 BLOCK_S: Final = 0.5
 """Shortest time in s in which the samples of a block arrive.
 
-After a stall, hundreds of late samples arrive at once. This time prevents that they fill a block
-alone: each block needs a sample that was on time.
+After a stall, hundreds of late samples arrive at once. Because of this shortest time, they cannot
+fill a block alone: each block needs a sample that was on time.
 """
 EARLY_S: Final = 5e-4
 """If a sample seems early by more than this time, in s, fewer samples were lost before it than

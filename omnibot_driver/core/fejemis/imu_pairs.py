@@ -53,7 +53,7 @@ is negative, the acceleration line comes first.
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to an interval between a gyro and an acceleration line if a line of
 another kind arrives in it. Such an interval is probably between two samples; the added time makes
-it longer than any interval within a sample."""
+it longer than an interval within a sample."""
 PATIENCE: Final = 60
 """Number of intervals after which the driver decides which line of a sample comes first, even if
 the magnitude of ``_evidence_s`` is still below ``KNOWN_S``. The magnitude stays small if the two
@@ -169,8 +169,8 @@ class ImuPairs:
 
         All of them are rejected in two cases:
 
-        * Since the previous pose, both gyro and acceleration lines are missing. Then any of the
-          pairs may be false.
+        * Both gyro and acceleration lines are missing: of each kind, fewer lines have arrived than
+          the board sends between the two poses. Then any of the pairs may be false.
         * The time since the previous pose is unknown: at the first pose, and at a pose whose time
           is before that of the previous pose.
         """

@@ -167,9 +167,9 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The line contains only numbers in which the checksum detects damage. So the sent voltage may be
-    lower than ``volts``, but it is at least ``LEAST_PART * volts``. Such a voltage exists for all
-    ``volts`` from ``LEAST_VOLTS`` to ``MOST_VOLTS``.
+    The line contains only numbers with which the checksum detects damage to the line. So the sent
+    voltage may be lower than ``volts``, but it is at least ``LEAST_PART * volts``. Such a voltage
+    exists for all ``volts`` from ``LEAST_VOLTS`` to ``MOST_VOLTS``.
     """
     if not volts:
         return OFF[0], 0.0

@@ -135,8 +135,8 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, the driver may be late, and the boards' data may wait to be read. Neither board is
-        blamed for missing data in the next ``OLDEST_S``, in which the driver reads this data.
+        If so, the driver may be late, and the boards' data may wait to be read. In the next
+        ``OLDEST_S``, the driver reads this data, and blames neither board for missing data.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

@@ -110,7 +110,7 @@ class LoisDecoder:
     def feed(self, data: bytes, now: float) -> list[Report]:
         """Return the reports that ``data`` completes, in the order in which the board sent them.
 
-        A report of several lines may be complete before the driver knows its end. Such a report is
+        While the driver cannot tell whether a report of several lines is complete, the report is
         held back until the next line. With empty ``data``, it is returned if no line has come for
         long enough.
         """

@@ -29,9 +29,10 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: for the left and right wheel, the standard deviation of the speed, because it
-    is unknown when and how fast the wheel decelerates. The sign gives the direction in which the
-    wheel rolls: the error of the time is the same for both wheels.
+    ``coasting_mps``: for the left and right wheel, the standard deviation of the speed that arises
+    because it is unknown when and how fast the wheel decelerates. The sign gives the direction in
+    which the wheel rolls: both wheels have the same error of the time, so their errors add up or
+    cancel.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

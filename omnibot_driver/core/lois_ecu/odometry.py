@@ -41,8 +41,8 @@ LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
 """Largest tick count, in turns of the wheel, that is a sign of a restart of the board while the
-robot is at rest. A restart begins the counts at zero; a larger count may come from a push of the
-robot. The limit is at least one tick."""
+robot is at rest. After a restart, the counts begin at zero; a larger count may come from a push of
+the robot. The limit is at least one tick."""
 FASTEST_MPS: Final = 5.0
 
 

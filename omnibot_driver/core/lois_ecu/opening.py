@@ -111,10 +111,10 @@ class SettingsWriter:
     def _waits(self) -> bool:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
-        While the robot drives, at most ``ROUNDS`` rounds are written, because each written gain
-        resets the controller of a wheel. But a round that has begun is completed: the terminal mode
-        at its beginning overwrites the left short correction, which a later line of the round
-        writes again.
+        While the robot drives, no round begins after ``ROUNDS`` rounds have been written, because
+        each written gain resets the controller of a wheel. But a round that has begun is completed:
+        the terminal mode at its beginning overwrites the left short correction, which a later line
+        of the round writes again.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 

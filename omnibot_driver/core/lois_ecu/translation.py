@@ -56,8 +56,9 @@ has restarted.
 SILENT_S: Final = 1.0
 """Limit, in s, for the time without tick reports, used to detect a restart of the board.
 
-Counts near zero and an irregular clock show that the board has restarted, or that the wheels have
-rolled back. After a longer time than the limit, the driver assumes a restart.
+If the counts are near zero and the clock is irregular, either the board has restarted, or the
+wheels have rolled back. If the time without tick reports is above the limit, the driver assumes a
+restart.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""

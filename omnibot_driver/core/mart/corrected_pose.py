@@ -116,9 +116,9 @@ class CorrectedPose:
         """End a turn on the spot: correct the heading, and return the correction in rad.
 
         If the server has reported a plausible angle, or none, the correction is zero. An
-        implausible angle belongs to another motion, or only one of the wheels has turned; the
-        driver cannot know which. So the angle from the encoder count is used instead, and the
-        difference between the two angles is added to the uncertainty.
+        implausible angle belongs to another motion, or only one of the wheels has turned. The
+        driver cannot know which is true. So the angle from the encoder count is used instead, and
+        the difference between the two angles is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

@@ -75,7 +75,7 @@ GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
 A server that executes the move does not answer HELLO. So an answer shows that the move is over and
-the reply to the move late or lost, or that the server was restarted.
+its reply is late or lost, or that the server was restarted.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.

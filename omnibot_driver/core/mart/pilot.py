@@ -133,8 +133,8 @@ class Pilot(Hearing):
         Do nothing in two cases:
 
         * During a motion or a job.
-        * If the server's stop port may hang (``Health.outlived``). The silence may only come from
-          the network, and then the port still hangs.
+        * If the server's stop port may hang (``Health.outlived``). A failure of the network may
+          have caused the silence, and then the port still hangs.
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()

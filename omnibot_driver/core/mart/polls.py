@@ -36,9 +36,9 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 In states that are not listed here, the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between their queries. In a shorter time, a late copy of
-one sonar's reply could be taken for the other's reply. The values would not show the mistake,
-because both sonars report the same value if nothing is near."""
+"""The two sonars, and the least time in s between their queries. With less time, a late copy of one
+sonar's reply could be taken for the other's reply. The values would not show the mistake, because
+both sonars report the same value if nothing is near."""
 
 
 class Polls:

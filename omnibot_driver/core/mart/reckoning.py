@@ -245,8 +245,8 @@ class Reckoning(CorrectedPose):
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
         While the start command may have been lost, the pose assumes that the last encoder count is
-        from before the start. If the count is from after the start, the pose lacks the motion that
-        the count shows, and these values are that motion. In all other cases, both values are zero.
+        from before the start. But the count may be from after the start. These values are the
+        motion that it shows in that case. At all other times, both values are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

@@ -139,7 +139,7 @@ class SpeedLoop(Motors):
         """Return the units with which RM (forward) starts both motors.
 
         The result is what the slower wheel needs for its speed, but at least LEAST_UNITS and at
-        most 60. It can be more if an earlier start turned no motor.
+        most 60. If an earlier start turned no motor, it can be more than the wheel needs.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))

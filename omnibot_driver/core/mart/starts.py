@@ -102,8 +102,8 @@ class Starts(FailedStarts):
         """Return the next request that switches off the motors. No packets while it must wait.
 
         The requests are MCS, which writes "stop" to both motors, and MSM, which ends the effect of
-        MCS. Each waits until a late reply to an earlier request cannot be mistaken for its own
-        reply. MSM also waits until no duplicate of MCS can arrive after MSM.
+        MCS. Each waits until no late reply to an earlier request can be mistaken for its own reply.
+        MSM also waits until no duplicate of MCS can arrive after MSM.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -129,7 +129,7 @@ class Starts(FailedStarts):
         """Return whether an earlier HELLO may reach the server after ``start``, a controlled move.
 
         The server might answer this HELLO just before a duplicate of the move begins. The driver
-        would take the answer as a proof that there is no duplicate.
+        would take the answer as proof that there is no duplicate.
 
         The result is False for other starts. It is also False after a fresh check of the IMU: the
         driver has waited before the check, so no earlier HELLO can arrive.

@@ -37,10 +37,11 @@ FROZEN_S, FROZEN_TIMES = 0.5, 3
 """Limits for a heading that stays constant. The driver stops the robot when both limits are
 reached, because the IMU may be dead, or the robot stuck.
 
-``FROZEN_S``: limit, in s, of the time. Twice the average duration of a query is added to it.
+``FROZEN_S``: limit, in s, of the time for which the heading is constant. Twice the average duration
+of a query is added to it.
 
-``FROZEN_TIMES``: limit of the number of equal replies. On a slow network, only few replies come
-within the time limit, and they may be equal by chance.
+``FROZEN_TIMES``: limit of the number of replies with the same heading. On a slow network, only few
+replies come within the time limit, and they may be equal by chance.
 """
 NO_START_S: Final = 1.5
 """Longest allowed time in s from the start of a motion until the robot moves."""

@@ -55,7 +55,7 @@ class WheelCount:
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
     ``maybe``: the last reported count while the start command may have been lost; otherwise 0. The
-    command may have been lost if the reported count is nearly the same as before the command.
+    command may have been lost if this count differs by at most 1 from the count before the command.
     """
 
     def __init__(self) -> None:

@@ -94,9 +94,9 @@ class OutlierFilter:
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
     * ``corrected``: whether the board corrects its own odometry. A correction can look like an
-      impossible motion. So the filter passes on an impossible but finite displacement, with
-      ``measured`` set to False. It also sets ``possible`` to False, except if the duration of the
-      displacement is 0 or unknown.
+      impossible motion. So if ``corrected`` is True, the filter passes on an impossible but finite
+      displacement, with ``measured`` set to False. It also sets ``possible`` to False, except if
+      the duration of the displacement is 0 or unknown.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -251,10 +251,9 @@ class _Spikes:
 
     The values are scaled so that a change of 1 between two readings is always plausible.
 
-    * ``left``: the limit ``STILL`` or ``BACK``.
+    * ``left``: the limit for spikes: ``STILL`` or ``BACK``.
     * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
-      can also change implausibly much. Such a change may be a spike only if one flipped bit
-      explains it.
+      can change implausibly much. Such a change may be a spike only if one flipped bit explains it.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
