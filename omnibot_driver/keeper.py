@@ -99,9 +99,9 @@ class Keeper:
 
         * ``stopped``: whether the robot is already stopped. If not, the guard sends its stop
           command before it ends.
-        * ``written``: whether the driver could write its last packets to the port. If not, the
-          guard discards the kernel's output before its stop command: old motion commands may wait
-          there.
+        * ``written``: whether the driver could write its last packets to the port. If not, a guard
+          that sends its stop command first discards the kernel's output: old motion commands may
+          wait there.
         """
         self._restart_at = math.inf
         if stopped:

@@ -276,8 +276,8 @@ def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> 
     ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. So the difference
     is between ``wall_ns - after_ns`` and ``wall_ns - before_ns``.
 
-    ``known_ns``: the previous result. Within these limits, it is returned again, so that the result
-    changes rarely. Otherwise the nearer limit is returned.
+    ``known_ns``: the previous result. If it is within these limits, it is returned again, so that
+    the result changes rarely. Otherwise the limit that is nearer to it is returned.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

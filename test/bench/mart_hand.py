@@ -4,8 +4,8 @@
 
 Arguments: the duration in s, and the namespaces of the robots.
 
-Output: a JSON list with one array for each namespace. The array has a pair for each speed: the time
-at which the speed was first published, in s of the steady clock, and the speed in m/s.
+Output: a JSON list with one array for each namespace. Each array has a pair for each speed: the
+time at which the speed was first published, in s of the steady clock, and the speed in m/s.
 """
 
 import json

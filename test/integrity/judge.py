@@ -17,9 +17,9 @@ MOST_DROPPED = 30
 
 The judge searches the true frames forward for one that equals the decoded frame. If it skips more
 intact frames than this number, the two frames may be equal by chance. Then the judge also searches
-for the next decoded frame of the same read, behind the found frame. If this search skips more than
-this number too, the first decoded frame is wrong. If the read has no next decoded frame, the first
-one is accepted.
+for the next decoded frame of the same read, after the found frame. If this search skips more than
+this number too, the decoded frame is wrong. If the read has no next decoded frame, the decoded
+frame is accepted.
 """
 REACH_BYTES = 600
 """Start of the search for the true frames that match a read. The search begins this number of

@@ -98,7 +98,7 @@ def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     If so, a shock of the robot has caused the unusual content, not damage. The result is also False
     if the complete frame is followed by bytes that cannot begin another frame.
 
-    ``closed``: whether no more bytes come. This is the result if ``held`` ends at ``at``.
+    ``closed``: whether no more bytes come. If ``held`` ends at ``at``, the result is ``closed``.
     """
     if at == len(held):
         return closed

@@ -22,8 +22,8 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: the new position in the sequence when a frame of ``kind`` arrives at the
-    position ``at``. It is the position after the first place with this kind, at ``at`` or later.
+    ``after[kind][at]``: the new position in the sequence when the position is ``at`` and a frame of
+    ``kind`` arrives. It is the one after the first place with this kind, at ``at`` or later.
     """
 
     def __init__(self, *kinds: Kind) -> None:

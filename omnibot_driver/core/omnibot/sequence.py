@@ -35,9 +35,8 @@ board's pose can then prove a restart.
 EARLY_S: Final = 0.2
 """Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-The check compares the time that the counter shows with the time since the last delta was read. If
-the driver read the last delta very late, the second time is too short. The tolerance allows for
-this case.
+After a restart, the time that the counter shows is shorter than the time since the last delta was
+read, except if the driver read this delta very late. The tolerance allows for this case.
 """
 LONG_GAP_S: Final = 1.0
 """A pose does not show a restart if deltas of more than this duration, in s, are missing before it.

@@ -43,8 +43,8 @@ LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest difference between the upper and the lower bound of a block, as a fraction of a period.
 
-If the bounds differ more, the lower bound is not used. With an adapter with a 16 ms timer, the
-bounds differ by less than 2 ms, which is a fifth of a 10 ms tick.
+If the bounds differ more, the lower bound is not used. The bounds of an adapter with a 16 ms timer
+differ by less than 2 ms, which is a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]

@@ -26,7 +26,7 @@ STOPS_PART: Final = 0.5
 The early and the late speed are those of the first and the second half of a drive.
 """
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Limits for the speed of a drive with twice the command, divided by the speed of a first drive.
+"""Limits for the speed of a second drive with twice the command, divided by that of the first.
 
 ``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: largest value for which
 the speed is regarded as unchanged. The limits allow for friction and rounding.

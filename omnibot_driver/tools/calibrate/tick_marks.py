@@ -112,7 +112,7 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    Each error is the median over all records, minus the mean of these medians.
+    Each error is the median over all turns in all records, minus the mean of these medians.
 
     ``rows``: for each record, the relative errors of its times between ticks.
 

@@ -52,7 +52,8 @@ The load changes slowly. Therefore residuals are correlated even at this distanc
 MISSED: Final = 0.42
 """Limit for the sum of the relative errors of two successive times between ticks.
 
-Above the limit, the board has missed a mark within the earlier time.
+If the sum is above the limit, and the earlier error above half of it, the board has missed a mark
+within the earlier time.
 
 * Missed mark: the earlier time covers two distances between marks, so its relative error is 1, and
   the sum is about 1. The sum is smaller if the board's clock loses time, which can be up to 6 ms.

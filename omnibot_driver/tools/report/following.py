@@ -72,9 +72,9 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The returned delay is the one with which commands and measurements fit best. If the command of
-    an axis was constant for 1 s or more in all (``SUSTAINED_S``), its gain is taken from this time
-    only.
+    The returned delay is the one with which commands and measurements fit best. The gain of an axis
+    is taken only from the times at which its command was not near zero and had been constant for
+    ``STEADY_S``. If these times are shorter than ``SUSTAINED_S`` in all, all times are used.
 
     ``usable``: for each measurement, whether to use it.
     """

@@ -130,7 +130,7 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     """After a letter, such as S (start), that is sent during a drive, the command is sent again.
 
     Zeros precede the letter. If the board has received only the first part of a frame, the zeros
-    may complete it to a wrong command. The next command corrects this.
+    may complete it to a wrong command, which the repeated command replaces.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

@@ -334,11 +334,11 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """Lines with another form than the learnt one are counted in windows of 24 lines.
+    """Lines with another form than the learnt one are counted in windows of 24 lines of a kind.
 
-    The decoder discards them as damaged. If a window has an 8th line of this kind, the decoder no
-    longer checks the form. Here, one window ends with 7 such lines, and the next one begins with 7.
-    All 14 are discarded. Only the 8th one of the second window is accepted.
+    The decoder discards them as damaged. When a window has 8 such lines, the decoder no longer
+    checks the form of this kind of line. Here, one window ends with 7 such lines, and the next one
+    begins with 7. All 14 are discarded. Only the 8th one of the second window is accepted.
 
     ``windows``: number of earlier windows without such lines.
     """

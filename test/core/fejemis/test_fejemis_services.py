@@ -337,8 +337,8 @@ def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None
     """The driver is to load the configuration, and stops the robot first. Then it shuts down.
 
     The job of loading fails, and its answer names the shutdown as the reason. Before the job, the
-    user changed a setting. The driver has not written this setting yet, and does not write it any
-    more. It only sends commands to stop, and the angles of the front wheel.
+    user changed a setting. The driver has not written this setting yet, and does not write it
+    during the shutdown. It only sends commands to stop, and the angles of the front wheel.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

@@ -106,7 +106,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """A motion line and an LED line lose adjacent characters: exactly the length of one line.
+    """A motion line and an LED line lose adjacent characters, exactly as many as one line has.
 
     If the motion line comes first, the remaining characters may be a wrong motion line. Therefore,
     the driver sends an LED line at least 15 ms after a motion line. If the LED line comes first,
