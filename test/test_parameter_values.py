@@ -225,7 +225,7 @@ def test_a_bias_is_three_numbers(name: str) -> None:
         PARAMETERS.by_name[name].check([0.0, 0.0])
 
 
-GAINS = Parameter("gains", [1.0], "1", "Two to four gains.", low=0.0, high=10.0, length=(2, 4))
+GAINS = Parameter("gains", [1.0], "m", "Two to four gains.", low=0.0, high=10.0, length=(2, 4))
 WORDS = Parameter("words", ["on"], "", "Any words.", choices=("on", "off"), length=(0, 2))
 ANY = Parameter("any", ["x"], "", "One word.")
 
@@ -250,8 +250,8 @@ def test_a_list_may_have_any_length_that_its_row_allows(
 @pytest.mark.parametrize(
     ("parameter", "wrong", "sentence"),
     [
-        (GAINS, [1.0], "must be 2 to 4 numbers, each 0 to 10 1, not [1.0]"),
-        (GAINS, [1.0, 11.0], "must be 2 to 4 numbers, each 0 to 10 1, not [1.0, 11.0]"),
+        (GAINS, [1.0], "must be 2 to 4 numbers, each 0 to 10 m, not [1.0]"),
+        (GAINS, [1.0, 11.0], "must be 2 to 4 numbers, each 0 to 10 m, not [1.0, 11.0]"),
         (GAINS, 1.0, "must be an array of doubles, not 1.0"),
         (WORDS, ["no"], "must be 0 to 2 strings, each on or off, not ['no']"),
         (WORDS, [True], "must be 0 to 2 strings, each on or off, not [True]"),

@@ -116,7 +116,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """The session makes an IMU reading from the bytes of one tick in at most ``bound`` calls."""
+    """The session makes at most ``bound`` calls until it has an IMU reading from a tick's bytes."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:

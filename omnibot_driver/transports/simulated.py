@@ -35,7 +35,7 @@ class SimulatedTransport:
     overruns: int | None = None
     """None, because a channel in memory does not count lost bytes."""
     ends_with_us: bool = True
-    """Always True, because the simulated board is in this process."""
+    """Always True: the simulated board is in this process and ends with it."""
     descriptors: tuple[int, ...] | None = None
     """None, because another process cannot inherit a channel in memory."""
 

@@ -47,7 +47,10 @@ class Relay:
                 time.sleep(PERIOD_S)  # the rate of the queries is part of the floor
 
     def listen(self) -> None:
-        """Receive replies. For each reply with an encoder count, publish the same two messages."""
+        """Receive replies. For each encoder count, publish an Odometry and a JointState.
+
+        The content of the two messages never changes.
+        """
         odometry = Odometry(child_frame_id="base_link")
         joint = JointState(name=["left_wheel_joint", "right_wheel_joint"], position=[0.0] * 2)
         while True:

@@ -63,7 +63,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 10)
     sections += ["", "Several drivers on this machine, each with a board:", "", *scale]
     say("small computer")
-    sections += ["", "One core, and a part of it (driver and floor have a part each):", ""]
+    sections += ["", "On a part of one core (driver and floor each have a part of this size):", ""]
     sections += small.table(*(((1.0, 0.25), 3.0) if quick else ()))
     say("linearity")
     sections += ["", "Time to decode, by the length of the stream:", "", *core.linearity()]

@@ -178,15 +178,17 @@ ENDINGS: Final[dict[str, Ending]] = {
         by_signals(signal.SIGINT), (1,), HANGS, allowed_s=0.5, late_s=4.0
     ),
     "an exception in the reader": Ending(by_topic, (1,), before=IN_THE_READER, read=True),
-    "SIGINT, the port full": Ending(partial(while_full, by_signals(signal.SIGINT)), full=True),
-    "an exception, the port full": Ending(
+    "SIGINT while the port is full": Ending(
+        partial(while_full, by_signals(signal.SIGINT)), full=True
+    ),
+    "an exception while the port is full": Ending(
         partial(while_full, by_topic),
         (1,),
         IN_A_CALLBACK.format("1 / 0"),
         full=True,
     ),
     "SIGKILL": Ending(by_signals(signal.SIGKILL), (-signal.SIGKILL,)),
-    "SIGKILL, the port full": Ending(
+    "SIGKILL while the port is full": Ending(
         partial(while_full, by_signals(signal.SIGKILL)), (-signal.SIGKILL,), full=True
     ),
     "a segmentation fault": Ending(

@@ -338,9 +338,9 @@ BOARD: Final = RigBoard(
             "busy_computer",
             "ctrl-C, plugged in but not yet open again",
             "SIGTERM while a call is pending",  # it calls ~/reset
-            "SIGINT, the port full",
-            "an exception, the port full",
-            "SIGKILL, the port full",
+            "SIGINT while the port is full",
+            "an exception while the port is full",
+            "SIGKILL while the port is full",
         }
     ),
 )

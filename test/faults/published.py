@@ -27,7 +27,7 @@ _GYRO: Final = math.radians(1 / 131)
 
 
 def imu_key(message: Imu) -> Key:
-    """Return the reading of a message in the sensor's counts."""
+    """Return the reading of a message, converted to counts of the sensor."""
     a, w = message.linear_acceleration, message.angular_velocity
     return a.x / _ACCEL, a.y / _ACCEL, a.z / _ACCEL, w.x / _GYRO, w.y / _GYRO, w.z / _GYRO
 

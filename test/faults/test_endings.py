@@ -18,8 +18,8 @@ SOME = (
     "an exit in a callback",
     "a callback that hangs, and ctrl-C",
     "a final Stop that hangs, and ctrl-C",
-    "an exception, the port full",
-    "SIGKILL, the port full",
+    "an exception while the port is full",
+    "SIGKILL while the port is full",
     "a segmentation fault",
 )
 """Names of the endings that this module tests.

@@ -23,9 +23,9 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""How far to search for the delta that matches a message, as a number of deltas.
+"""Reach of the search for the delta that matches a message, as a number of deltas.
 
-The search begins at the delta that fits the message's timestamp.
+The search begins at the delta that fits the message's timestamp, and goes in both directions.
 """
 LONGEST_STALL = 1000
 """Reach of the search for the IMU frame that matches a message, as a number of frames.

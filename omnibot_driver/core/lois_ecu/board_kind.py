@@ -69,9 +69,9 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        The driver adds up how far wheels that are commanded backward roll backward according to the
-        board's odometry. If the sum exceeds ``UNCOUNTED_M`` and no count has ever decreased, the
-        board counts only forward.
+        The driver looks at each wheel that is commanded backward. The board's odometry shows how
+        far this wheel rolls backward, and the driver adds up these distances. If the sum exceeds
+        ``UNCOUNTED_M`` and no count has ever decreased, the board counts only forward.
 
         ``told``: changes in the board's odometry since the previous odometry report; None if
         unknown.

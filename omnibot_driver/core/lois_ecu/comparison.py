@@ -74,10 +74,10 @@ the distance that the wheel rolls while reports are lost. First value: at a stea
 value: at an oscillating speed. Only a wheel without counted ticks has this error."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""The board's odometry (0x20) corrects a wheel's distance. If it corrects more than
-``CORRECTED_TICKS``, an error remains, because the filter is linear and the motion of a starting
-wheel is not. ``CORRECTED_PART`` times the part of the correction above ``CORRECTED_TICKS`` is the
-standard deviation of this error."""
+"""The board's odometry (0x20) corrects a wheel's distance. If a correction is larger than
+``CORRECTED_TICKS``, an error remains: the filter is linear, and the start of a wheel is not. The
+standard deviation of this error is ``CORRECTED_PART`` times the excess over ``CORRECTED_TICKS``.
+Only a wheel without counted ticks has this error."""
 LATE_PART: Final = 0.6
 """Error in a wheel's distance that a late report causes: standard deviation, as a fraction of the
 distance that the wheel rolls during the delay. Only a wheel without counted ticks has this error.

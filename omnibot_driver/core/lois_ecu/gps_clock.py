@@ -32,8 +32,8 @@ class GpsClock:
     def set_date(self, date: GpsDate) -> None:
         """Use a reported date.
 
-        While the receiver does not have the date, it sends zeros or a false year. Dates from 2038
-        on are rejected too, because they do not fit into a ROS time.
+        Zeros and false years are rejected: the receiver sends them while it has no date. Dates from
+        2038 on are rejected because they do not fit into a ROS time.
         """
         self.dated = bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
         self._date = date if self.dated else None

@@ -54,10 +54,10 @@ class SizeErrors:
         ]
 
     def covariance(self, yaw_rad: float) -> Covariance:
-        """Return the covariance of the pose in a coordinate frame in which its yaw is ``yaw_rad``.
+        """Return the covariance of the pose, in the frame in which the robot's yaw is ``yaw_rad``.
 
-        The copies of the path are computed in another frame. The two frames may differ by a
-        constant rotation.
+        This class computes its copies of the path in a frame of its own, which may be turned
+        against the caller's frame. The method turns the result into the caller's frame.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

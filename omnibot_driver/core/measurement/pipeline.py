@@ -122,7 +122,7 @@ class MeasurementPipeline:
         return self._tally
 
     def flush(self) -> list[Measured]:
-        """Return the measurements from the readings that ``hear`` has not processed."""
+        """Process the readings that ``hear`` has left waiting, and return their measurements."""
         measured: list[Measured] = []
         for reading, stamp_s in self.undigested:
             for sure, at_s in self._outliers.admit(reading, stamp_s):

@@ -75,7 +75,8 @@ def outside(
 
     A value of 0 or less means that the motion is inside.
 
-    ``explained``: the velocities that the recent set-points allow, that of the current one first.
+    ``explained``: the velocities that the recent set-points allow. The first is that of the current
+    set-point.
 
     ``heading_known``: if False, the direction of the linear velocity is not checked.
     """

@@ -52,7 +52,8 @@ After a silence, the first bytes are more likely the beginning of a frame.
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a run of unexplained bytes, in addition to ``BAD_RUN``.
 
-An IMU frame has 14 bytes. As a run of unexplained bytes, they cost more than any true IMU frame.
+An IMU frame has 14 bytes. A run of 14 unexplained bytes costs more than any true IMU frame, so the
+search prefers the frame.
 """
 BAD_HEADER: Final = 0.5
 """Cost of a header within unexplained bytes. Such a header may arise by chance, or from the values

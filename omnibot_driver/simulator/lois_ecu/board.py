@@ -3,7 +3,7 @@
 """The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
 The simulation is deterministic. Assumptions beyond the manual: set-points never expire, ticks wrap
-at 2³², and the e-stop button zeroes set-points when pressed and released.
+at 2³², and the e-stop button zeroes set-points when it is pressed, and again when it is released.
 
 This module knows the manual's table of messages and, through ``Quirks``, the public firmware. It
 does not know ports or real time.

@@ -33,12 +33,13 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", motion: Motion) -> bool:
-    """Stop an uncontrolled motion (F, B, RM, R, L).
+    """Stop a motion that has no target: a drive (F, B, RM) or a spin (R, L).
 
-    Return whether the caller must wait for the end of the motion.
+    Return True if the caller must wait for the end of the motion.
 
-    A motion that is already stopping is not stopped again. A drive (F, B, RM) that the server does
-    not supervise is not stopped at all.
+    A motion that is already stopping is not stopped again. The caller waits for the end of such a
+    drive, but not of such a spin. A drive that the module ``alarms`` no longer watches is not
+    stopped, and the caller does not wait.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

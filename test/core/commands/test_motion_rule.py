@@ -219,7 +219,10 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """After a stall of 3 s the driver sends only Stop. The notice names the driver as the cause."""
+    """The driver stalls for 3 s. Then it sends only Stop, until the next command.
+
+    Its only notice says that the driver itself stalled. It does not blame the board or the sender.
+    """
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

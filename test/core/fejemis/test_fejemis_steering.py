@@ -254,12 +254,12 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
-    """A reverse command that the driver has limited to zero is not driven later.
+    """A reverse command that the driver has set to zero is not driven later.
 
-    The motion monitor has stopped the robot twice, so motion is refused until ~/start. A node
-    repeats the command -0.3 m/s. While ``allow_reverse`` is off, the driver limits this command to
-    zero, and accepts it. Then the user sets ``allow_reverse``. The robot stays at rest, and the
-    node's next command is refused.
+    The motion monitor has stopped the robot twice. So motion is refused until ~/start, but a zero
+    command is still accepted. A node repeats the command -0.3 m/s. ``allow_reverse`` is off, so the
+    driver sets this command to zero, and accepts it. Then the user sets ``allow_reverse``. The
+    robot stays at rest. The node's next command is a motion, so it is refused.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

@@ -92,7 +92,7 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """Adjacent characters of two successive set-points are lost, exactly as many as a line has.
+    """A run of characters as long as one line is lost. It spans two successive set-points.
 
     The remaining characters are a valid line with a wrong set-point. To prevent this, the driver
     sends set-points at least 18 ms apart.

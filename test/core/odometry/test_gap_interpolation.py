@@ -181,8 +181,8 @@ def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> No
 def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> None:
     """Two displacements are lost after a suspected restart. Two poses disprove the restart.
 
-    ``use_board_pose`` is False, so the lost motion is assumed, but not later than at the next
-    displacement.
+    ``use_board_pose`` is False, so the poses do not show the lost motion. The odometry assumes that
+    the robot continued its last motion. The estimates after the poses include the assumed motion.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
     attach(odometry, trip.pose)
