@@ -71,8 +71,8 @@ class PoseReading:
 
     * ``lost``: number of lost displacements whose motion this pose includes. ``lost`` of the next
       DisplacementReading does not include them.
-    * ``restarted``: whether the counter of this pose shows a restart of the board that the
-      displacements before this pose did not show.
+    * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame, that
+      the displacements before this pose did not show.
     """
 
     x_m: float

@@ -9,6 +9,7 @@ clearly contradict the pose, the pose alone decides.
 """
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
@@ -46,6 +47,24 @@ NEW_FRAME: Final = 4
 
 Each of these poses must agree with the rejected pose just before it.
 """
+MOVED_FRAME: Final = 2
+"""Number of agreements, as in ``NEW_FRAME``, if the wheel speeds explain the motion between the
+poses."""
+
+
+@dataclass(slots=True)
+class _Jump:
+    """Rejected poses that may begin a new coordinate frame, although the robot has not jumped.
+
+    Wheel speeds are known for the whole time since the last accepted pose. They contradict the
+    first rejected pose, and they explain the motion from each rejected pose to the next.
+
+    ``first``: the first rejected pose. ``rolled``: the motion from the last accepted pose to it,
+    computed from the wheel speeds.
+    """
+
+    first: BoardPose
+    rolled: Pose
 
 
 class PoseOdometry:
@@ -61,6 +80,9 @@ class PoseOdometry:
         self._pose: BoardPose | None = None
         self._told = Pose()
         self._restarted = False
+        self._moved = False
+        """Whether the last displacement ended in a new coordinate frame, which the next PoseReading
+        must report."""
         self._settled_s = -math.inf
         self.begin()
 
@@ -73,6 +95,7 @@ class PoseOdometry:
         self._agreed = 0
         """How often in a row a rejected pose has agreed with the pose before it, which was
         rejected, too."""
+        self._jump: _Jump | None = None
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_at = -math.inf
@@ -86,6 +109,7 @@ class PoseOdometry:
     def forget(self) -> None:
         """Forget the last pose, because the board has restarted in a new coordinate frame."""
         self._restarted |= self._pose is not None
+        self._moved = False
         self._settled_s = -math.inf
         self._pose = None
         self.begin()
@@ -107,11 +131,12 @@ class PoseOdometry:
         displacement = self.pose(pose, now)
         if displacement is None:
             return []
-        if not displacement.restarted and pose.time_s - self._settled_s < SETTLE_EVERY_S:
+        is_new = displacement.restarted or self._moved
+        if not is_new and pose.time_s - self._settled_s < SETTLE_EVERY_S:
             return [displacement]
         self._settled_s = pose.time_s
-        place = self._told
-        return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
+        place, moved, self._moved = self._told, self._moved, False
+        return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad, restarted=moved)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
         """Return the displacement from the previous pose to ``pose``; None if ``pose`` is rejected.
@@ -128,8 +153,8 @@ class PoseOdometry:
         seconds = pose.time_s - before.time_s
         way = log_of(self._told.way_to(_place(pose)))
         if seconds < LEAST_S or not self._explained(way, seconds, now):
-            return self._doubt(pose)
-        self._doubted, self._agreed = None, 0
+            return self._doubt(pose, seconds, now)
+        self._doubted, self._agreed, self._jump = None, 0, None
         displacement = self._drawn(way, seconds, pose.decimals, now)
         self._pose = pose
         self._told = self._told.moved(roll(displacement))
@@ -137,23 +162,31 @@ class PoseOdometry:
 
     def _begin_at(self, pose: BoardPose) -> None:
         self._pose, self._told = pose, _place(pose)
-        self._doubted, self._agreed = None, 0
+        self._doubted, self._agreed, self._jump = None, 0, None
 
-    def _doubt(self, pose: BoardPose) -> DisplacementReading | None:
+    def _doubt(self, pose: BoardPose, since_s: float, now: float) -> DisplacementReading | None:
         before, self._doubted = self._doubted, pose
         self.refused += 1
-        if before is None or self._pose is None:
+        if self._pose is None:
+            return None
+        if before is None:
+            self._jump = self._jump_at(pose, since_s, now)
             return None
         seconds = pose.time_s - before.time_s
         way = log_of(_place(before).way_to(_place(pose)))
         if seconds < LEAST_S or not _possible(way, seconds):
-            self._agreed = 0
+            self._agreed, self._jump = 0, self._jump_at(pose, since_s, now)
             return None
         # Two rejected poses agree. If the robot can have reached the second, it is accepted.
         # Otherwise, the board may have begun a new coordinate frame (command ``enc0``).
-        since_s = pose.time_s - self._pose.time_s
         whole = log_of(self._told.way_to(_place(pose)))
         self._agreed += 1
+        rolled = self._rolled(seconds, now)
+        if self._jump is not None and rolled is not None and self._near(way - rolled, seconds):
+            # The board computes poses and wheel speeds from the same encoders. So the poses have a
+            # new origin, even if the robot could have driven to this place.
+            return self._in_moved_frame(pose, self._jump, since_s)
+        self._jump = None
         if since_s > 0.0 and _possible(whole, since_s):
             self._begin_at(pose)
             return _reading(whole, since_s)
@@ -163,6 +196,28 @@ class PoseOdometry:
         return DisplacementReading(
             way.x_m, way.y_m, way.yaw_rad, "body", seconds, 0, restarted=True
         )
+
+    def _jump_at(self, pose: BoardPose, since_s: float, now: float) -> _Jump | None:
+        """Return the jump that begins with this rejected pose; None if it may not be one.
+
+        ``since_s``: time in s since the last accepted pose.
+        """
+        assert self._pose is not None
+        digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)
+        if digit_m > SLACK_M or since_s < LEAST_S:  # rounding alone can contradict the wheels
+            return None
+        rolled = self._rolled(since_s, now)
+        return None if rolled is None else _Jump(pose, rolled)
+
+    def _in_moved_frame(
+        self, pose: BoardPose, jump: _Jump, since_s: float
+    ) -> DisplacementReading | None:
+        if self._agreed < MOVED_FRAME:
+            return None
+        way = roll(jump.rolled).moved(_place(jump.first).way_to(_place(pose)))
+        self._begin_at(pose)
+        self._moved = True
+        return _reading(log_of(way), since_s)
 
     def _rolled(self, seconds: float, now: float) -> Pose | None:
         """Return the motion in ``seconds``, computed from the last two pairs of wheel speeds.
@@ -186,7 +241,9 @@ class PoseOdometry:
         rolled = self._rolled(seconds, now)
         if rolled is None:  # after a gap the next pose must confirm a large step
             return seconds <= FRESH_S or (way.way_m <= SLACK_M and abs(way.yaw_rad) <= SLACK_RAD)
-        off = way - rolled
+        return self._near(way - rolled, seconds)
+
+    def _near(self, off: Pose, seconds: float) -> bool:
         slack_m = SLACK_M + SPEED_UP_MPS2 * seconds * seconds
         return off.way_m <= slack_m and abs(off.yaw_rad) <= SLACK_RAD + slack_m / self.track_m
 

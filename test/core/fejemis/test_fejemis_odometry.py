@@ -9,11 +9,12 @@ import statistics
 from collections.abc import Callable
 
 import pytest
-from fejemis_bench import WHEELS, Bench, nominal
+from fejemis_bench import DRIVE, WHEELS, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
 from omnibot_driver.core.fejemis.odometry import PoseOdometry
+from omnibot_driver.core.fejemis.sums import with_sum
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimate import OdometrySettings
@@ -139,9 +140,58 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
     drive.board = Pose()
     drive.run(0.0, 0.0, 0.2)
     assert before.way_to(drive.out).way_m < 0.02
-    assert sum(reading.restarted for reading in drive.readings) == 1
     drive.run(0.3, 0.0, 1.0)
     assert before.way_to(drive.out).way_m == pytest.approx(0.3, abs=0.03)
+
+
+@pytest.mark.parametrize("seconds", [0.3, 0.8, 1.5, 4.0])
+@pytest.mark.parametrize(("v", "w"), [(0.3, 0.2), (0.3, 0.0), (0.0, 0.8)])
+def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
+    seconds: float, v: float, w: float
+) -> None:
+    """If another program sends ``enc0`` during a drive, ``odom`` keeps the way that was driven.
+
+    Regression: a robot could have driven back to the new origin, if it was near enough. Then the
+    odometry went back by the whole way, with a standard deviation of a few millimetres.
+    """
+    bench = nominal()
+    bench.drive_on(v, w, 2.0)
+    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+    bench.drive_on(v, w, seconds)
+    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+    bench.drive_on(v, w, 1.0)
+    bench.run(1.5)
+    last, truth = bench.odometry[-1], bench.robot.truth
+    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
+    assert off.way_m < 0.02
+    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
+
+
+def test_a_pose_set_to_zero_at_rest_does_not_move_the_odometry() -> None:
+    """If another program sends ``enc0`` while the robot stands, ``odom`` stays where it is."""
+    bench = nominal()
+    bench.drive_on(0.3, 0.2, 1.0)
+    bench.run(1.5)
+    before = bench.odometry[-1].pose
+    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+    bench.run(1.5)
+    off = before.way_to(bench.odometry[-1].pose)
+    assert off.way_m < 0.005
+    assert abs(off.yaw_rad) < 0.005
+
+
+def test_a_pose_with_coarse_digits_is_no_new_frame() -> None:
+    """A board prints its pose in steps of 0.1 m. The odometry follows it, step by step.
+
+    Each step contradicts the wheel speeds, but the board's frame has not moved.
+    """
+    drive = Drive()
+    for _ in range(400):
+        drive.step(0.3, 0.0, heard=False)
+        drive.odometry.speeds(WheelSpeeds(0.3, 0.3), drive.now)
+        place = drive.board
+        drive.say(BoardPose(round(drive.now, 5), round(place.x_m, 1), 0.0, 0.0, 1))
+    assert drive.out.x_m == pytest.approx(2.4, abs=0.11)
 
 
 @pytest.mark.slow
