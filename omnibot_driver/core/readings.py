@@ -11,6 +11,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 from omnibot_driver.core.values import value
 
 Vector3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,19 @@ class ImuReading:
     specific_force: Vector3
     angular_velocity: Vector3
     lost: int = 0
+
+
+@value(frozen=True, slots=True)
+class OrientedImuReading:
+    """The board's orientation, with the turn rates and the specific force of the last IMU sample.
+
+    * ``orientation``: quaternion x, y, z, w.
+    * ``angular_velocity``: in rad/s. ``specific_force``: in m/s².
+    """
+
+    orientation: Quaternion
+    angular_velocity: Vector3
+    specific_force: Vector3
 
 
 @value(frozen=True, slots=True)

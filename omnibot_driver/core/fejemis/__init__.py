@@ -11,11 +11,11 @@ from omnibot_driver.core.fejemis.readings import (
     Job,
     JobDone,
     MagneticReading,
-    OrientedImuReading,
     RangeReading,
     SteeringReading,
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
+from omnibot_driver.core.readings import OrientedImuReading
 
 __all__ = [
     "BatteryReading",

@@ -14,7 +14,6 @@ from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.values import value
 
 RangeName = Literal["tof", "sonar", "ir1", "ir2"]
-Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
@@ -35,20 +34,6 @@ class SteeringReading:
     """Angle of the steered wheel in rad, positive to the left."""
 
     angle_rad: float
-
-
-@value(frozen=True, slots=True)
-class OrientedImuReading:
-    """The board's orientation, with the turn rates and the specific force of the last IMU sample.
-
-    ``orientation``: quaternion x, y, z, w. ``angular_velocity``: in rad/s.
-
-    ``specific_force``: in m/s².
-    """
-
-    orientation: Quaternion
-    angular_velocity: Vector3
-    specific_force: Vector3
 
 
 @value(frozen=True, slots=True)

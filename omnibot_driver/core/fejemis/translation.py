@@ -27,14 +27,18 @@ from omnibot_driver.core.fejemis.odometry import PoseOdometry
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     MagneticReading,
-    OrientedImuReading,
-    Quaternion,
     RangeReading,
     SteeringReading,
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.teensy_clock import StampedReadings, TeensyClock
-from omnibot_driver.core.readings import ExtraReading, NoticeReading, Reading
+from omnibot_driver.core.readings import (
+    ExtraReading,
+    NoticeReading,
+    OrientedImuReading,
+    Quaternion,
+    Reading,
+)
 
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0

@@ -2,11 +2,16 @@
 
 """Subtraction of the IMU's biases, and the figures of the IMU for the diagnostics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
-from omnibot_driver.core.readings import DisplacementReading, ImuReading, Vector3
+from omnibot_driver.core.readings import (
+    DisplacementReading,
+    ImuReading,
+    OrientedImuReading,
+    Vector3,
+)
 from omnibot_driver.core.reporting.figures import ImuFigures
 from omnibot_driver.core.values import value
 
@@ -49,6 +54,21 @@ class BiasCorrector:
         """Use new settings, but keep the gyro's bias, which a calibration may have measured."""
         self.calibration.refine = correction.auto_gyro_bias
         self._correction = correction
+
+    def corrected(self, content: object) -> object:
+        """Return ``content`` minus the biases if it is an orientation with a sample of the IMU.
+
+        Return any other content as it is.
+        """
+        if not isinstance(content, OrientedImuReading):
+            return content
+        (x, y, z), (bias_x, bias_y, bias_z) = content.specific_force, self._correction.accel_bias
+        (u, v, w), (bias_u, bias_v, bias_w) = content.angular_velocity, self.calibration.bias
+        return replace(
+            content,
+            specific_force=(x - bias_x, y - bias_y, z - bias_z),
+            angular_velocity=(u - bias_u, v - bias_v, w - bias_w),
+        )
 
     def estimate(self, reading: ImuReading, stamp_s: float) -> ImuEstimate:
         """Return the reading minus the biases, and pass the reading to the calibration."""

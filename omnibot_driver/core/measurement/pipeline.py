@@ -150,7 +150,7 @@ class MeasurementPipeline:
         if isinstance(reading, EStopButtonReading):
             return [Extra(reading, stamp_s)]
         if isinstance(reading, ExtraReading):
-            return [Extra(reading.content, stamp_s)]
+            return [Extra(self.inertial.corrected(reading.content), stamp_s)]
         if isinstance(reading, ResetReading | NoticeReading):
             return []
         self._clock.restart()

@@ -16,7 +16,7 @@ from omnibot_driver.core.events import Extra
 from omnibot_driver.core.fejemis.imu import ImuSamples
 from omnibot_driver.core.fejemis.imu_pairs import Pair
 from omnibot_driver.core.fejemis.messages import Acceleration, Gyro
-from omnibot_driver.core.fejemis.readings import OrientedImuReading
+from omnibot_driver.core.readings import OrientedImuReading
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware
 

@@ -5,13 +5,18 @@
 import pytest
 from fejemis_bench import DRIVE, FRONT, nominal
 
+from omnibot_driver.core.commands.limits import SpeedLimits
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     MagneticReading,
-    OrientedImuReading,
     RangeReading,
     SteeringReading,
 )
+from omnibot_driver.core.imu.bias_correction import ImuCorrection
+from omnibot_driver.core.odometry.estimator import OdometrySettings
+from omnibot_driver.core.readings import OrientedImuReading
+from omnibot_driver.core.settings import SessionSettings
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 
 
@@ -34,6 +39,30 @@ def test_all_sensors_are_told_in_si_units() -> None:
     ranges = {reading.name: reading.distance_m for reading in bench.extras(RangeReading)}
     assert ranges == pytest.approx({"tof": 0.3, "sonar": 0.3, "ir1": 0.3, "ir2": 0.3}, abs=0.01)
     assert bench.extras(SteeringReading)[-1].angle_rad == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_biases_are_subtracted_from_both_imu_topics() -> None:
+    """The driver subtracts ``gyro_bias`` and ``accel_bias`` from imu/data as from imu/data_raw.
+
+    Regression: the samples with an orientation were published with the biases.
+    """
+    bench = nominal()
+    settings = SessionSettings(
+        limits=SpeedLimits(linear_mps=1.0, angular_radps=1.5),
+        commands=CommandSettings(),
+        odometry=OdometrySettings(),
+        imu=ImuCorrection(accel_bias=(0.0, 0.0, 0.5)),
+    )
+    bench.session.configure(settings, bench.now)
+    before = bench.extras(OrientedImuReading)[-1]
+    bench.session.gyro_bias = (0.0, 0.0, 0.1)
+    bench.events.clear()
+    bench.run(1.0)
+    for after in bench.imu[-1], bench.extras(OrientedImuReading)[-1]:
+        assert after.angular_velocity[2] == pytest.approx(
+            before.angular_velocity[2] - 0.1, abs=0.02
+        )
+        assert after.specific_force[2] == pytest.approx(before.specific_force[2] - 0.5, abs=0.3)
 
 
 @pytest.mark.slow
