@@ -50,6 +50,14 @@ SERVICES: Final = {
     "load_configuration": Job.LOAD,
     "power_off": Job.POWER_OFF,
 }
+BIASES: Final = {
+    Job.CALIBRATE_GYRO: "gyro_bias",
+    Job.CALIBRATE_ACCELEROMETER: "accel_bias",
+}
+"""For each calibration: the parameter with the bias that the driver subtracts.
+
+After the calibration, the board subtracts the bias itself. The driver must not subtract it again.
+"""
 
 
 class FejemisTopics:
@@ -193,9 +201,26 @@ class FejemisTopics:
                 return response
             done: JobDone = await answer
             response.success, response.message = done.success, done.message
+            if done.success and job in BIASES:
+                response.message += self._forget_bias(BIASES[job])
             return response
 
         return serve
+
+    def _forget_bias(self, name: str) -> str:
+        """Set a bias of the driver to zero, because the board has just removed its own bias.
+
+        ``name``: the parameter. Return a text about it for the answer, or an empty string if the
+        parameter was zero.
+        """
+        was_set = any(self._values[name])
+        # Even if the parameter was zero: the driver may have refined the gyro's bias.
+        self._node.set_parameters([rclpy.Parameter(name, value=[0.0, 0.0, 0.0])])
+        return (
+            f"; the driver's parameter {name} is now 0, so also remove it from your files"
+            if was_set
+            else ""
+        )
 
     def _answer(self, done: JobDone, _stamp_ns: int) -> None:
         if isinstance(done.token, Future):

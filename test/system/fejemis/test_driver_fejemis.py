@@ -231,6 +231,37 @@ def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
     moves_again(probe, robot)
 
 
+def test_a_calibration_of_the_board_ends_the_drivers_own_bias(
+    stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
+) -> None:
+    """The driver subtracts biases, and the user calibrates the board's gyro and accelerometer.
+
+    Then the board's readings have no bias any more, so the driver's own biases become 0.
+
+    Regression: the driver still subtracted its biases, so the calibrated readings had an error.
+    """
+    robot = robot_of(stack, tmp_path)
+    biases = {"gyro_bias": [0.0, 0.0, 0.1], "accel_bias": [0.0, 0.0, 0.5]}
+    probe: Probe = probe_of(started(robot, start_driver, **biases))
+    probe.wait_for_state("nominal")
+    for service, name in (
+        ("calibrate_gyro", "gyro_bias"),
+        ("calibrate_accelerometer", "accel_bias"),
+    ):
+        answer = probe.call(Trigger, service)
+        assert answer.success, answer.message
+        assert f"parameter {name} is now 0" in answer.message
+        answer = probe.call(Trigger, service)
+        assert answer.success, answer.message
+        assert name not in answer.message
+    samples = probe.listen(Imu, "imu/data_raw")
+    probe.wait_for(lambda: len(samples) > 50)
+    rates = [sample.angular_velocity.z for sample in samples]
+    forces = [sample.linear_acceleration.z for sample in samples]
+    assert sum(rates) / len(rates) == pytest.approx(0.0, abs=0.02)
+    assert sum(forces) / len(forces) == pytest.approx(9.81, abs=0.1)
+
+
 def test_power_off_is_refused_while_driving(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
