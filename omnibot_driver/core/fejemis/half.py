@@ -44,6 +44,9 @@ TOGETHER: Final = ("gyro", "acc")
 """Streams that are subscribed in one packet, so that the board sends all of them in the same
 cycle."""
 AGAIN_S: Final = 0.5
+SLOW: Final = 0.5
+"""If fewer lines than this fraction of the expected number arrive, the driver subscribes again to
+the stream that driving requires."""
 ASK_AGAIN_S: Final = 0.1
 """Time in s between two requests for the heartbeat. The driver sends these requests as long as it
 does not know whether the board has restarted."""
@@ -101,6 +104,10 @@ class Half:
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
         self._at: dict[str, float] = {}
+        self._needed, self._needed_since, self._was_slow = 0, math.inf, False
+        """How many lines of the stream that driving requires have arrived since the time
+        ``_needed_since``, in s; infinity before the first check. ``_was_slow``: whether the last
+        check found too few of them."""
         self._next_at = -math.inf
         self._unsure_at: float | None = None
         self._ask_at = -math.inf
@@ -155,10 +162,13 @@ class Half:
     def note(self, keyword: str, now: float) -> None:
         """Record that a line with this ``keyword`` arrived."""
         self._at[keyword] = now
+        if self.role is not None and keyword == NEEDED[self.role]:
+            self._needed += 1
 
     def subscribe_again(self) -> None:
         """Subscribe to all streams again, because the board may have forgotten them."""
         self._at = {key: at for key, at in self._at.items() if key == "hbt"}
+        self._needed_since, self._was_slow = math.inf, False
         self._next_at = -math.inf
         self.ready = False
 
@@ -196,7 +206,24 @@ class Half:
             return [b"leave", *(text.encode("ascii") for text in every)]
         if NEEDED[self.role] in wanted and not self.unsure:
             self._unsure_at, self._ask_at = now, now
+        needed, is_slow = NEEDED[self.role], self._is_slow(now)
+        if is_slow and not {*wanted, *self.unknown_streams} & {needed}:
+            texts.append(f"sub {needed} {STREAMS[self.role][needed]}".encode("ascii"))
         return texts
+
+    def _is_slow(self, now: float) -> bool:
+        """Return whether the stream that driving requires is much slower than its subscription.
+
+        Another program may have subscribed to it with a longer period. The method compares the
+        number of lines since its last call with the expected number. Two calls in a row must find
+        too few lines: after the first, lines may still wait to be read.
+        """
+        assert self.role is not None
+        count, since = self._needed, self._needed_since
+        self._needed, self._needed_since = 0, now
+        expected = (now - since) / (1e-3 * STREAMS[self.role][NEEDED[self.role]])
+        was_slow, self._was_slow = self._was_slow, count < SLOW * expected
+        return was_slow and self._was_slow
 
     def _admit(self, message: Message, now: float) -> bool:
         if isinstance(message, Comment):

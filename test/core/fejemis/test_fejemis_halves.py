@@ -7,6 +7,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, drive_until_refused, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis.readings import Job
+from omnibot_driver.core.fejemis.sums import with_sum
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware, SimulatedFejemis
 
@@ -387,3 +388,22 @@ def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() ->
     bench.session.inbound.receive(b"# Starting main loop\n", bench.now, DRIVE)
     bench.run(3.0)
     assert any("drive board has restarted" in text for text in bench.notices)
+
+
+@pytest.mark.parametrize(
+    ("channel", "text"), [(FRONT, b"sub fwl 100"), (DRIVE, b"sub pose 200"), (DRIVE, b"sub pose 0")]
+)
+def test_a_slower_subscription_of_another_program_is_replaced(channel: int, text: bytes) -> None:
+    """Another program subscribes to a stream that driving requires, with a longer period.
+
+    Regression: with an angle every 100 ms, the driver refused all motion until a reconnect. With a
+    pose every 200 ms, the odometry stayed that slow.
+    """
+    bench = nominal()
+    bench.robot.receive(with_sum(text) + b"\n", bench.now, channel)
+    bench.run(3.0)
+    bench.events.clear()
+    bench.drive_on(seconds=1.0)
+    assert len(bench.odometry) >= 45
+    assert bench.odometry[-1].twist is not None
+    assert bench.odometry[-1].twist.vx_mps > 0.2
