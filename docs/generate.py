@@ -106,6 +106,8 @@ def _row(row: Parameter) -> str:
 def _yaml(value: Value) -> str:
     if isinstance(value, bool):
         return str(value).lower()
+    if isinstance(value, float) and "." not in str(value):
+        return str(value).replace("e", ".0e")  # YAML 1.1 reads 1e-06 as a string
     return str(value) if value != "" else '""'
 
 

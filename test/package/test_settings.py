@@ -17,6 +17,7 @@ import rclpy
 import yaml
 from rclpy.context import Context
 
+from omnibot_driver import boards
 from omnibot_driver.boards.omnibot import PARAMETERS
 
 ROOT = Path(__file__).parents[2]
@@ -91,6 +92,14 @@ def test_ros_reads_each_parameter_file(path: Path) -> None:
     context = Context()
     rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
     rclpy.shutdown(context=context)
+
+
+@pytest.mark.parametrize("board", boards.PROFILES)
+def test_yaml_reads_the_defaults_in_each_parameter_file(board: str) -> None:
+    """The YAML parser of Python reads each default: it would take 1e-06 for a string."""
+    rows = boards.load(board).PARAMETERS.by_name
+    values = load(f"{board}.yaml")["/**"]["ros__parameters"]
+    assert values == {name: rows[name].default for name in values}
 
 
 def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
