@@ -266,7 +266,9 @@ def test_every_sample_is_given_by_a_reader_that_stalls(
     chances,
     st.floats(0.0, 0.1),
     st.floats(0.0, 0.1),
-    st.one_of(st.floats(0.001, 0.15), st.none()),
+    st.one_of(
+        st.floats(0.001, 0.15).filter(lambda period_s: abs(period_s - 0.01) > 5e-4), st.none()
+    ),
     st.floats(0.0, 0.1),
 )
 @settings(max_examples=50, deadline=None)
@@ -283,6 +285,9 @@ def test_no_pair_has_lines_of_two_samples(
     In such a pair, one line is read late, the other line is read less than 5 ms later, and no pose
     follows in the same read. Then nothing in the stream shows that the lines belong to different
     samples.
+
+    ``period_s``: period of the reads in s; None if each line is read at once. It is not the period
+    of the samples: such reads would hide which line of a sample comes first.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
