@@ -146,6 +146,11 @@ class FrameDecoder:
         """Whether some bytes of the last accepted frame arrived with the last call of ``feed``."""
         return len(self._held) < self._arrived
 
+    @property
+    def _unused(self) -> bool:
+        """Whether the decoder has neither accepted nor discarded anything so far."""
+        return not self._in_step and self._damaged_at_s == -math.inf
+
     def _close(self, found: list[Frame]) -> None:
         if self._held:
             self._settle(found, closed=True)
@@ -304,17 +309,20 @@ class FrameDecoder:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
         A frame is decided if later bytes cannot change the decision. A frame that ends at the
-        position ``until`` or before is decided without waiting for later bytes.
+        position ``until`` or before is decided without waiting for later bytes. If the line has
+        carried exactly one frame and is closed, this frame is accepted.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
         in_step, end = self._in_step, -1
+        alone = closed and len(pieces) == 1 and pieces[0].start == 0 and self._unused
         for number, piece in enumerate(pieces):
             proved = (
                 in_step
                 or piece.start == end
                 or any(piece.end == after.start for after in pieces[number + 1 : number + 2])
                 or type(piece.frame) is PausedFrame
+                or (alone and piece.end == size)
             )
             sure = proved and piece.sure
             if (

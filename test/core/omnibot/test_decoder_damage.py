@@ -271,11 +271,7 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """``flush`` returns a complete frame that the decoder has held. It returns no incomplete frame.
-
-    It returns no frame at all as long as the decoder has not found the sequence of frames in the
-    stream.
-    """
+    """``flush`` returns a complete frame that the decoder has held, and no incomplete frame."""
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()
     in_step.feed(LEAD_IN + encode(doubtful), 0.0)
@@ -284,9 +280,29 @@ def test_flush_tells_what_can_still_be_told() -> None:
     partial = FrameDecoder()
     partial.feed(LEAD_IN + encode(REST)[:13], 0.0)
     assert partial.flush(0.0) == []
-    unproved = FrameDecoder()
-    assert unproved.feed(encode(REST), 0.0) == []
-    assert unproved.flush(0.0) == []
+
+
+@pytest.mark.parametrize("frame", [REST, DeltaFrame(1, 2, 3, 4), PoseFrame(10.0, -20.0, 300.0, 5)])
+def test_flush_tells_the_only_frame_of_a_line(frame: Frame) -> None:
+    """A line carries exactly one frame. ``flush`` returns it, because nothing speaks against it.
+
+    If a byte is missing or added, or if the decoder has discarded bytes before, the frame is not
+    returned.
+    """
+    data = encode(frame)
+    for pieces in ([data], [data[index : index + 1] for index in range(len(data))]):
+        alone = FrameDecoder()
+        assert [found for piece in pieces for found in alone.feed(piece, 0.0)] == []
+        assert alone.flush(0.0) == [frame]
+        assert alone.feed(data, 0.0) + alone.flush(0.0) == [frame]
+    for index in range(len(data)):
+        for damaged in (data[:index] + data[index + 1 :], data[:index] + b"\x41" + data[index:]):
+            decoder = FrameDecoder()
+            assert decoder.feed(damaged, 0.0) + decoder.flush(0.0) == []
+    after = FrameDecoder()
+    after.feed(b"\x41\x42", 0.0)
+    assert after.flush(0.0) == []
+    assert after.feed(data, 0.0) + after.flush(0.0) == []
 
 
 def test_a_decoder_goes_on_after_a_flush() -> None:
