@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.groups import Assembler, Timed
-from omnibot_driver.core.lois_ecu.lines import BEGIN, END, LENGTH, line_of
+from omnibot_driver.core.lois_ecu.lines import BEGIN, END, LENGTH, Line, line_of
 from omnibot_driver.core.lois_ecu.messages import RecordKind, Report, TerminalLine
 from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, TicksGate
 from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
@@ -18,6 +18,9 @@ from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 LONGEST_LINE: Final = 256
 """Largest accepted length of a line in bytes. Lines of the board's sensors, such as the GPS, are
 shorter than this."""
+SURE_AFTER: Final = 8
+"""Number of lines without a checksum that must follow a line with a checksum before such lines are
+accepted again."""
 
 
 @dataclass(slots=True)
@@ -38,7 +41,9 @@ class DecoderStatistics:
 class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
-    ``sum_required``: whether lines without a checksum are discarded.
+    ``sum_required``: whether lines without a checksum are discarded. If False, they are discarded
+    only while the board sends lines with a checksum: a line that loses two characters is as long as
+    a line without a checksum, and its value would be wrong.
 
     ``ticks_gate``: check of the tick reports.
 
@@ -57,6 +62,8 @@ class LoisDecoder:
         self._held = b""
         self._cut_bytes = 0
         """Number of bytes of the current line that were already discarded."""
+        self._doubted = 0
+        """Number of the next lines without a checksum that are discarded."""
 
     @property
     def statistics(self) -> DecoderStatistics:
@@ -149,7 +156,7 @@ class LoisDecoder:
         if at >= 0:
             # A line that lost characters is too short. Two lines become one only if fourteen
             # characters in a row are lost.
-            line = line_of(text[at:] + END, sum_required=self.sum_required)
+            line = self._line(text[at:] + END)
         if line is None:
             length = len(text) + 1 + before
             if self.terminal and not before and at < 0 and _is_text(text):
@@ -160,6 +167,17 @@ class LoisDecoder:
             self._damaged(at + before)
         self.statistics.lines += 1
         return self._assembler.add(line, now)
+
+    def _line(self, text: bytes) -> Line | None:
+        line = line_of(text)
+        if line is not None:
+            self._doubted = SURE_AFTER
+        elif not self.sum_required:
+            line = line_of(text, sum_required=False)
+            if line is not None and self._doubted:
+                self._doubted -= 1
+                return None
+        return line
 
     def _damaged(self, length: int) -> None:
         self.statistics.faults += 1

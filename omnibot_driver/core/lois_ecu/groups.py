@@ -221,8 +221,10 @@ class Assembler:
             self.statistics.damaged_groups += 1
             return []
         if isinstance(group, Ticks) and was_after_ticks:
-            if self._appends and not self._ticks_gate.would_pass(group, self._at):
-                self.statistics.damaged_groups += 1  # probably half an odometry group
+            # Half an odometry group consists of zeros if the robot has not driven yet.
+            half = not any(payloads) or not self._ticks_gate.would_pass(group, self._at)
+            if self._appends and half:
+                self.statistics.damaged_groups += 1
                 return []
             self._appends = False
         if not in_range(group):

@@ -298,6 +298,41 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
         assert decoder.feed(heading, 0.0) == [Heading(5)]
 
 
+def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None:
+    """The board sends lines with a checksum, and the decoder does not require it.
+
+    A line loses two characters, so it is as long as a line without a checksum. It is discarded.
+    Lines without a checksum are accepted after a few of them have come.
+
+    Bug: zero ticks became 57 ticks, because the checksum was read as a part of the value.
+    """
+    decoder = LoisDecoder(sum_required=False)
+    heading, short = encode_report(Heading(0)), b":100000003b\n"
+    assert decoder.feed(heading, 0.0) == [Heading(0)]
+    assert heading[:7] + heading[9:] == short
+    assert decoder.feed(short + heading, 0.1) == [Heading(0)]
+    found = decoder.feed(b":1000000005\n" * 10, 0.2)
+    assert found == [Heading(5)] * 2
+
+
+def test_half_an_odometry_group_of_zeros_is_not_a_report_of_ticks() -> None:
+    """The robot has not driven, so the board's odometry after the ticks consists of zeros.
+
+    The driver stalls in this group, and reads its second half late. It returns no ticks of zeros.
+
+    Bug: their clock of 0 showed a restart of the board.
+    """
+    ticks, odometry = Ticks(4317, 0, 0), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
+    decoder = LoisDecoder()
+    found = decoder.feed(encode_report(ticks) + encode_report(odometry), 0.0)
+    found += decoder.feed(b"", 0.1)
+    assert found == [ticks, odometry]
+    later = encode_report(Ticks(4519, 0, 0)) + encode_report(odometry)
+    found = decoder.feed(later[: 14 * 8], 0.2) + decoder.feed(b"", 0.4)
+    found += decoder.feed(later[14 * 8 :], 0.5) + decoder.feed(encode_report(Heading(5)), 0.6)
+    assert found == [Ticks(4519, 0, 0), Heading(5)]
+
+
 def test_lines_of_a_sensor_come_out_where_they_are_expected() -> None:
     """The decoder passes sensor lines on in a terminal mode.
 
