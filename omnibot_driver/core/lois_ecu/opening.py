@@ -33,12 +33,16 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
-# For up to 13 ms, the board may receive nothing. Without a pause, the beginning of a motion command
-# and the end of another line could form a new motion command.
-AFTER_MOTION_S: Final = 0.015
-"""Shortest time in s from a motion command to a *side command*. Side commands are neither motion
-commands nor settings: for example, a command for the LED. The time between two set-points is
-longer, so the driver can send a side command between them."""
+# For up to 13 ms, the board may receive nothing. Without a pause, the beginning of a set-point and
+# the end of another line could form a motion command. Even the beginning of a Stop is dangerous:
+# with the end of a setting, it could command full duty.
+AFTER_SET_POINT_S: Final = 0.015
+"""Shortest time in s from a set-point to a setting, and from a motion command to a *side command*.
+Side commands are neither set-points nor settings: for example, a command for the LED. The time
+between two set-points is longer, so the driver can send another line between them."""
+LONGEST_WAIT_S: Final = 0.5
+"""Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
+may be due each time that a setting could be sent."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
 """Delays in s from a tick report to the next round of settings, and from a report of any kind to a
 request for a date. The driver uses the delays in turn: the board cannot receive while it sends, and
@@ -122,15 +126,20 @@ class SettingsWriter:
     def _others_at(self) -> float:
         if not self._others:
             return math.inf
-        return max(self._others[0][0], self._points.moved_at_s + AFTER_MOTION_S)
+        return max(self._others[0][0], self._points.moved_at_s + AFTER_SET_POINT_S)
 
     @property
     def _settings_at(self) -> float:
         if self._waits:
             return math.inf
         if self._queue:
-            return self._queue[0][0]
-        return self._round_at_s if self._rounds_left else math.inf
+            at_s = self._queue[0][0]
+        elif self._rounds_left:
+            at_s = self._round_at_s
+        else:
+            return math.inf
+        apart_s = self._points.said_at_s + AFTER_SET_POINT_S
+        return max(at_s, min(apart_s, at_s + LONGEST_WAIT_S))
 
     def begin(self, now: float) -> None:
         """Start to write all settings, after a connection, a restart or a change of settings."""
@@ -217,7 +226,11 @@ class SettingsWriter:
 
         A board that has just booted verifies checksums. So it obeys only a line with a checksum,
         also if this line tells it to expect no checksums from now on.
+
+        A Stop gets the form that the settings exclude (see ``_begin_round``).
         """
+        if command == outbound.STOP:
+            return encode_command(command, with_sum=not self.settings.with_sum)
         line = outbound.lines(command, with_sum=self.settings.with_sum)
         if isinstance(command, SetTerminalMode) and not self.confirmed:
             return encode_command(command, with_sum=True) + line
@@ -228,6 +241,11 @@ class SettingsWriter:
 
         Do nothing if no round is left, or if some commands of the previous round still wait to be
         sent.
+
+        Another program may have left the board with the other form of lines (``checksum``) while
+        the robot rolls. This board ignores each Stop of the driver. So while the settings are
+        unconfirmed, each of the first ``ROUNDS`` rounds begins with a Stop in the other form. A
+        board that expects the usual form ignores this line.
         """
         if self._queue or not self._rounds_left:
             return
@@ -235,6 +253,9 @@ class SettingsWriter:
         self._rounds += 1
         self._round_at_s = max(now, self._round_at_s) + ROUND_S
         at_s = now
+        if self._rounds <= ROUNDS and not self.confirmed:
+            self._queue.append((now, outbound.STOP))
+            at_s += LINE_S  # a write of its own: its beginning must not meet the end of a setting
         for command in self._turned(self._rounds):
             self._queue.append((at_s, command))
             at_s += LINE_S
@@ -272,7 +293,10 @@ class SettingsWriter:
             yield self._left_short_correction()
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
         for stream, period_ms in settings.periods_ms.items():
-            yield SetPeriod(stream, period_ms)
+            # A written period begins anew on the board, which makes this interval longer. So most
+            # of the later rounds leave the ticks alone: else no interval could confirm the period.
+            if stream is not Stream.TICKS or self._rounds <= ROUNDS or not self._rounds % 3:
+                yield SetPeriod(stream, period_ms)
         for setting, number in settings.written.items():
             yield WriteSetting(setting, number)
 

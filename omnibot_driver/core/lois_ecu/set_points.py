@@ -34,6 +34,8 @@ class SetPoints:
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 
     ``moved_at_s``: time of the last motion command.
+
+    ``said_at_s``: time of the last set-point, also of a zero one.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -45,7 +47,7 @@ class SetPoints:
         """Begin a new connection, and forget the set-points that were sent."""
         self._said: SetRpm | SetDuty | None = None
         self.stopped_at_s = math.inf
-        self.moved_at_s = -math.inf
+        self.moved_at_s = self.said_at_s = -math.inf
         self.stood = False
         self._clears_left = outbound.CLEARED_TIMES
 
@@ -58,6 +60,7 @@ class SetPoints:
         """Record that ``data`` was sent to the board. Return the set-points in it."""
         said = outbound.set_points(data, with_sum=self.settings.with_sum)
         for command in said:
+            self.said_at_s = now
             if _moves(command):
                 self.stopped_at_s, self.stood = math.inf, False
                 self.moved_at_s = now

@@ -232,7 +232,7 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
     while not found:
         rig.run(0.1)
         found = [reading for reading in rig.readings if isinstance(reading, RecordReading)]
-        assert rig.now < 15.0
+        assert rig.now < 14.5
     (reading,) = found
     assert reading.record.kind is kind
     assert len(reading.record.left) == 21

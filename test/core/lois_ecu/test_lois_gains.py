@@ -2,6 +2,7 @@
 
 """Tests of controller gains: how they reach the board, and the notice about missing gains."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -10,11 +11,15 @@ from lois_bench import Bench
 from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.lois_ecu import Setting
+from omnibot_driver.core.lois_ecu import Setting, encode_command
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.opening import ROUNDS, SettingsWriter
+from omnibot_driver.core.lois_ecu.outbound import STOP
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+OTHER_STOP = b":0100000000\n"
+"""Stop without a checksum, which a board that verifies checksums ignores."""
 
 
 def opened(settings: LoisEcuSettings) -> AnyBench:
@@ -70,7 +75,8 @@ def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
     for count in range(ROUNDS):
-        robot.board.receive(writer.due(float(count)) + writer.due(count + 0.9))
+        robot.board.receive(writer.due(float(count)))
+        robot.board.receive(writer.due(count + 0.9))
         for _ in range(100):
             robot.advance()
     left, right = (wheel.controller.gains for wheel in robot.board.wheels)
@@ -95,7 +101,47 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
     asked = [index for index, (_, data) in enumerate(sent) if data.startswith(b":0f0000fffe")]
     assert len(asked) == ROUNDS
     assert all(sent[index + 1][0] - sent[index][0] >= 0.0199 for index in asked[:-1])
-    assert all(len(data) == 14 for _, data in sent)
+    own = [data for _, data in sent if data != OTHER_STOP]
+    assert len(own) == len(sent) - ROUNDS
+    assert all(len(data) == 14 for data in own)
+
+
+@pytest.mark.parametrize("reads_s", [0.001, 0.01, 0.07])
+def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
+    """Stop is repeated 20 times a second while the driver writes its settings in rounds.
+
+    No setting is sent within 15 ms of a Stop, unless the driver is called too seldom for that.
+    In either case, all rounds are sent.
+
+    Bug: at each connection, the low-pass followed the first Stop at once. If the board then lost
+    fourteen characters, it obeyed the rest of both lines: full duty for one wheel.
+    """
+    points = SetPoints(HOST_GAINS)
+    writer = SettingsWriter(HOST_GAINS, points)
+    writer.begin(0.0)
+    now, stopped_at_s, followed = 0.0, -math.inf, []
+    while not writer.done:
+        assert now < 10.0
+        if now >= stopped_at_s + 0.05:
+            stopped_at_s = now
+            points.wrote(encode_command(STOP), now)
+        if now >= writer.wake_at and writer.due(now):
+            followed.append(now - stopped_at_s)
+        now += reads_s
+    assert min(followed) >= (0.0149 if reads_s < 0.05 else 0.0)
+
+
+def test_a_stop_in_the_other_form_is_written_alone() -> None:
+    """A round begins with a Stop in the form of lines that the settings exclude.
+
+    Even if the driver is called late, no setting is in the same write: the beginning of this Stop
+    and the end of a setting could command full duty.
+    """
+    writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
+    writer.begin(0.0)
+    sent = [writer.due(0.3 * count) for count in range(40)]
+    assert sent.count(OTHER_STOP) == ROUNDS
+    assert all(data == OTHER_STOP or OTHER_STOP not in data for data in sent)
 
 
 @pytest.mark.slow
@@ -105,6 +151,7 @@ def test_a_wheel_that_does_not_start_gets_its_settings_again_at_rest() -> None:
     The driver writes the settings again at rest. The next drive moves the robot.
     """
     bench = Bench("firmware", HOST_GAINS)
+    bench.run(1.0)
     for wheel in bench.board.wheels:
         wheel.controller.change(low_pass=0.0)
     before = len(bench.written)

@@ -102,6 +102,21 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
     assert heard(joined, with_sum=True, lenient=False) == [(2, 17 << 16)]
 
 
+def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
+    """A Stop and the low-pass follow each other. A run of fourteen characters is lost.
+
+    If the Stop comes first, the remaining characters may command full duty. To prevent this, the
+    driver sends a setting at least 15 ms after a set-point. If the low-pass comes first, there is
+    no danger.
+    """
+    stop = encode_command(STOP)
+    low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
+    assert heard(stop[:3] + low_pass[3:], with_sum=True, lenient=False) == [(1, 0x3F80_0000)]
+    for at in range(1, 14):
+        found = heard(low_pass[:at] + stop[at:], with_sum=True, lenient=False)
+        assert all(line == (1, 0) or line[0] == 0x23 for line in found)
+
+
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,

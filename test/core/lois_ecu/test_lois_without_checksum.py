@@ -3,11 +3,14 @@
 """Tests of a LOIS ECU that the user wants to drive without checksums (``checksum: false``)."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
+from any_board import AnyBench, LoisRobot
 from lois_bench import FIRMWARE, Bench
 from lois_drives import HOST_GAINS, Rig, nominal
 
+from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 BOOT_SHORT_CORRECTION = 1.0761719
@@ -69,3 +72,32 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
             rig.run(0.1)
         corrections.append(rig.board.wheels[0].short_correction)
     assert corrections == pytest.approx([BOOT_SHORT_CORRECTION] * 5)
+
+
+@FIRMWARE
+@pytest.mark.parametrize("with_sum", [True, False])
+@pytest.mark.parametrize("commands", [True, False])
+def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
+    firmware: str, *, with_sum: bool, commands: bool
+) -> None:
+    """Another program has left the board with the other form of lines, while the robot rolls.
+
+    The driver opens the port. The board obeys a Stop within half a second, both without commands
+    and with commands to drive slowly backward.
+
+    Bug: the robot rolled on for seconds, because the board ignored each Stop.
+    """
+    lois = LoisRobot(firmware)
+    board: Any = lois.board
+    board.receive(b":233f80000066\n:020014001438\n" + (b":11000000043e\n" if with_sum else b""))
+    bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=with_sum)), lois)
+    bench.run(2.0)
+    assert board.truth.speed_mps > 0.1
+    bench.open()
+    for _ in range(5):
+        if commands and bench.session.state == "nominal":
+            bench.drive(-0.1)
+        bench.run(0.1)
+    assert (1, 0) in {(one.command, one.payload) for one in board.commands}
+    bench.run(1.0)
+    assert board.truth.speed_mps < 0.02
