@@ -47,6 +47,26 @@ def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -
     assert last(estimates) == close(before, 0.06)
 
 
+def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertainty() -> None:
+    """The robot drives at 0.35 m/s. The board restarts, and its first count fits a gap of 1.6 s.
+
+    The first pose shows the restart. Odom stays, and only the way in which the robot came to rest
+    is uncertain.
+    """
+    odometry, estimates = Odometry(SETTINGS), []
+    for number in range(75):
+        estimates += odometry.displace(earth(0.014, 0.0), number * PERIOD_S)
+        if number % 5 == 4:
+            estimates += odometry.settle(PoseReading(0.014 * (number + 1), 0.0, 0.0))
+    for number in range(115, 120):
+        still = replace(earth(0.0, 0.0), lost=40 if number == 115 else 0)
+        estimates += odometry.displace(still, number * PERIOD_S)
+    estimates += odometry.settle(PoseReading(0.0, 0.0, 0.0, restarted=True))
+    assert last(estimates) == close((0.014 * 75, 0.0, 0.0), 0.001)
+    assert estimates[-1].covariance.xx < 0.15 * 0.15
+    assert estimates[-1].covariance.yaw_yaw < 0.5 * 0.5
+
+
 @pytest.mark.slow
 @given(
     st.lists(small_moves, min_size=1, max_size=8),

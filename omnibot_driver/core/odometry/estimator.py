@@ -159,6 +159,8 @@ class Odometry:
         restarted = reading.restarted and (
             bool(self._backlog) or not self._frame.continues(told, self._track.uncertainty.gap)
         )
+        if restarted:
+            self._backlog.restart()
         if restarted or self._is_new_frame(told, confirmed):
             return self._attach(told, reading.lost)
         if self._frame.pose is None or self._frame.since_restart is not None:

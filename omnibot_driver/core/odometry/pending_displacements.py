@@ -39,6 +39,18 @@ class PendingDisplacements:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s
 
+    def restart(self) -> None:
+        """Record that the board restarted directly before the first displacement that waits here.
+
+        The number of lost displacements before it, and its duration, are then unknown.
+        """
+        if self._waiting:
+            reading, stamp_s = self._waiting[0]
+            self._waiting[0] = (
+                replace(reading, lost=0, duration_s=None, restarted=True),
+                stamp_s,
+            )
+
     @property
     def lost(self) -> int:
         """Number of displacements lost directly before the first displacement that waits here."""
