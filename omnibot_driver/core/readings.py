@@ -87,6 +87,8 @@ class PoseReading:
       DisplacementReading does not include them.
     * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame, that
       the displacements before this pose did not show.
+    * ``ambiguous``: whether the counters fit a restart in a long gap before this pose as well as a
+      loss of everything in this gap. Only the pose itself can then decide.
     """
 
     x_m: float
@@ -94,6 +96,7 @@ class PoseReading:
     yaw_rad: float
     lost: int = 0
     restarted: bool = False
+    ambiguous: bool = False
 
 
 @dataclass(frozen=True, slots=True)

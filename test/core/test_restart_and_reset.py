@@ -67,6 +67,31 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
     assert estimates[-1].covariance.yaw_yaw < 0.5 * 0.5
 
 
+@pytest.mark.parametrize(
+    ("ambiguous", "told_m", "x_m"), [(True, 0.0, 0.3), (True, 0.05, 0.05), (False, 0.0, 0.0)]
+)
+def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
+    ambiguous: bool, told_m: float, x_m: float
+) -> None:
+    """The board restarts in a gap, and both of its counters fit the gap by chance.
+
+    A pose exactly at the new origin shows the restart, so odom stays. A pose beside it, or with
+    counters that exclude a restart, shows that the robot drove there in the gap.
+    """
+    odometry, estimates = Odometry(SETTINGS), []
+    for number in range(75):
+        estimates += odometry.displace(earth(0.004, 0.0), number * PERIOD_S)
+        if number % 5 == 4:
+            estimates += odometry.settle(PoseReading(0.004 * (number + 1), 0.0, 0.0))
+    for number in range(127, 177):
+        still = replace(earth(0.0, 0.0), lost=52 if number == 127 else 0)
+        estimates += odometry.displace(still, number * PERIOD_S)
+        if number % 5 == 1:
+            pose = PoseReading(told_m, 0.0, 0.0, ambiguous=ambiguous and number == 131)
+            estimates += odometry.settle(pose)
+    assert last(estimates) == close((x_m, 0.0, 0.0), 0.001)
+
+
 @pytest.mark.slow
 @given(
     st.lists(small_moves, min_size=1, max_size=8),

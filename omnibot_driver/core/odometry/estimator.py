@@ -20,7 +20,7 @@ from omnibot_driver.core.odometry.pending_displacements import (
     advanced,
     chord,
 )
-from omnibot_driver.core.odometry.pose_gate import expected
+from omnibot_driver.core.odometry.pose_gate import BELIEVED_M, BELIEVED_TURN_RAD, expected
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 LONGEST_WAIT_S: Final = 1.0
@@ -173,6 +173,9 @@ class Odometry:
         lost, self._told_lost = reading.lost + self._told_lost, 0
         lost_s = lost * self._bridge.last[1] if self._bridge.last else 0.0
         is_long = bool(self._backlog) or lost_s > LONG_GAP_S
+        if reading.ambiguous and self._has_begun_anew(told):
+            self._backlog.restart()
+            return self._attach(told, 0)
         if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
             return self._resume(told, lost_s)
         estimates = self._release()
@@ -232,6 +235,17 @@ class Odometry:
             confirmed=confirmed,
             reachable=self._reachable(told),
         )
+
+    def _has_begun_anew(self, told: Pose) -> bool:
+        """Return whether the board began a new frame in the gap before the waiting displacements.
+
+        It did if these displacements lead from zero to the pose ``told``, and the robot was not
+        near zero before the gap. The counters do not decide, because they fit both cases.
+        """
+        assert self._frame.pose is not None
+        begun = self._backlog.before(told)
+        near = begun.way_m <= BELIEVED_M and abs(begun.yaw_rad) <= BELIEVED_TURN_RAD
+        return bool(self._backlog) and near and not expected(self._frame.pose, NOTHING)
 
     def _attach(self, told: Pose, lost: int) -> list[OdometryEstimate]:
         """Adopt a new frame of the board. The odometry continues from its current pose.

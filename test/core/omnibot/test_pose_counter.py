@@ -57,6 +57,28 @@ def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> 
     assert sequence.pose((60 + poses) % 256, count * 0.04) == Step(0)
 
 
+@pytest.mark.parametrize(("uptime", "ambiguous"), [(1228, True), (1150, False), (972, False)])
+def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restart(
+    uptime: int, ambiguous: bool
+) -> None:
+    """The board sends ``uptime`` deltas, is silent for 2.1 s, and then counts from zero again.
+
+    After 1228 deltas, both counters also continue the old ones: deltas at 1280, poses at 256.
+    After 1150 deltas, both show the restart. After 972, only the counter of the poses does.
+    """
+    sequence = Sequence()
+    for count in range(uptime):
+        sequence.delta(count % 256, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    begun_s = uptime * 0.04 + 2.1
+    steps = [sequence.delta(count, begun_s + count * 0.04) for count in range(5)]
+    pose = sequence.pose(0, begun_s + 4 * 0.04)
+    assert pose.ambiguous == ambiguous
+    assert ambiguous != (pose.restarted or any(step.restarted for step in steps))
+    assert not sequence.pose(1, begun_s + 9 * 0.04).ambiguous
+
+
 @pytest.mark.parametrize("lost", [1300, 2600])
 def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(lost: int) -> None:
     """More than 256 poses are lost, so the counter of the poses wraps. The gap lasts over 51.2 s.
@@ -72,7 +94,9 @@ def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(
         step = sequence.delta(count % 256, count * 0.04)
         assert step == Step(lost if count == 50 + lost else 0)
         if count % 5 == 4:
-            assert sequence.pose(count // 5 % 256, count * 0.04) == Step(0)
+            pose = sequence.pose(count // 5 % 256, count * 0.04)
+            assert not pose.lost
+            assert not pose.restarted
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
