@@ -49,15 +49,15 @@ def assert_obeys(bench: AnyBench, within_s: float = 3.0) -> None:
 
 @pytest.mark.slow
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The robot is commanded to drive 0.3 m/s for 4 s. It drives 1.2 m, or less if it starts late.
+    """The robot is commanded to drive 0.3 m/s for 4 s. It drives about 1.2 m.
 
-    Odometry has the true distance within 2 cm.
+    A robot that starts late drives less far. Odometry has the true distance within 2 cm.
     """
     bench.drive_on(0.3, 4.0)
     bench.run(1.5)
     assert bench.robot.stands
     late_s = getattr(bench.robot, "late_s", 0.0)
-    assert bench.robot.way_m == pytest.approx(0.3 * (4.0 - late_s), rel=0.2)
+    assert 0.8 * 0.3 * (4.0 - late_s) < bench.robot.way_m < 1.2 * 0.3 * 4.0
     assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.way_m, abs=0.02)
 
 

@@ -9,7 +9,6 @@ delta arrives.
 Input: counters and arrival times; this module does not know what a frame contains.
 """
 
-from dataclasses import replace
 from typing import Final
 
 from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
@@ -52,14 +51,11 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``ambiguous``: for a pose: whether both counters fit a restart in the long gap before it as
-      well as a loss of all deltas in this gap.
     """
 
     lost: int
     duration_s: float | None = USUAL.delta_period_s
     restarted: bool = False
-    ambiguous: bool = False
 
 
 class Sequence:
@@ -86,7 +82,10 @@ class Sequence:
         Such a counter may be damaged. If the next delta continues it, it was right. Until then, the
         number of lost deltas is computed from the elapsed time.
         """
-        self._ambiguous = False
+        self.ambiguous = False
+        """Whether both counters, at the last pose, fit a restart in the long gap before this pose
+        as well as a loss of all deltas in this gap."""
+        self._may_be_new = False
         """Whether a long gap has ended since the last pose, and the counter of the delta after it
         also fits a counter that began at zero in this gap."""
         self._left: tuple[int, float, int] | None = None
@@ -142,7 +141,7 @@ class Sequence:
         elif ahead and lost >= WRAP - per_pose:
             lost = in_time  # not a wrap: a false delta was counted before
         lost -= min(lost, told)
-        self._ambiguous |= from_zero and lost * period_s > LONG_GAP_S
+        self._may_be_new |= from_zero and lost * period_s > LONG_GAP_S
         self._since_pose += lost + 1
         return Step(lost, period_s)
 
@@ -153,14 +152,9 @@ class Sequence:
 
         In the result, ``lost`` is the number of missing deltas. The pose contains their motion.
         """
-        ambiguous, self._ambiguous = self._ambiguous, False
-        step = self._pose_step(count, now)
-        if not ambiguous or step.restarted or self._delta is None:
-            return step
-        both_from_zero = abs(count * self._per_pose - self._delta) <= self._per_pose
-        return replace(step, ambiguous=both_from_zero)
-
-    def _pose_step(self, count: int, now: float) -> Step:
+        may_be_new, self._may_be_new, self.ambiguous = self._may_be_new, False, False
+        if may_be_new and self._delta is not None:
+            self.ambiguous = abs(count * self._per_pose - self._delta) <= self._per_pose
         if self._reconnected:
             return Step(0)  # the next delta counts the losses from before and after this pose
         before, self._pose = self._pose, count
@@ -181,7 +175,7 @@ class Sequence:
         wrap = WRAP * self._per_pose
         off = (passed - counted) % wrap
         if from_zero and not goes_on and min(off, wrap - off) > 2 * self._per_pose:
-            self._delta, self._ahead = delta, None
+            self._delta, self._ahead, self.ambiguous = delta, None, False
             return Step(0, None, restarted=True)
         if not in_time:
             return Step(0)  # too little time has passed for these losses

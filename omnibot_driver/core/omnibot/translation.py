@@ -170,7 +170,7 @@ class Translation:
                     theta * POSE_LSB_RAD,
                     lost=step.lost,
                     restarted=step.restarted,
-                    ambiguous=step.ambiguous,
+                    ambiguous=self._sequence.ambiguous,
                 )
                 self.suspicion.posed(frame, pose, self.settings.pose_byte_order)
                 return pose
