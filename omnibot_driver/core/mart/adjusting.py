@@ -27,6 +27,12 @@ same.
 ``WAG_UNITS``: motor units added to the left motor, and subtracted from the right one.
 """
 
+PROBE_S: Final = 1.0
+"""Time in s without an answered change of the units, after which the driver sends ``CS 0 0`` in B.
+
+This request changes nothing. Its answer shows whether the server still supervises the motion: after
+a restart, the motors keep running, and no other reply in B shows that.
+"""
 STARTED_M: Final = 0.01
 """Distance in m after which it is certain that the current units are enough to turn the motors."""
 
@@ -52,7 +58,11 @@ class Adjusting(Moves):
         self.commanded = twist
         if change is None and self._heading_is_told and self._frozen_s > WAG_S:
             change = (-WAG_UNITS, WAG_UNITS)  # the next change undoes this small turn
+        self._probes = change is None
         if change is None:
+            obeyed_s = max(self._begun_s, self._obeyed_s)
+            if self.state is State.REVERSING and now >= obeyed_s + PROBE_S:
+                return self._ask(words.CS.request(0, 0), now)
             return NO_PACKETS
         right, left = change
         self._require(words.RMCS if self.state is State.DRIVING else words.CS)

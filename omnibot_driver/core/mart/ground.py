@@ -63,6 +63,14 @@ PRESENT_S: Final = 0.35
 
 The time is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
+GAP_S, GAP_LONGEST_S = 0.12, 1.0
+"""Limits in s for a short silence of a server at rest, in which it may have been restarted.
+
+``GAP_S``: shortest such silence. Twice the average duration of a query is added to it.
+
+``GAP_LONGEST_S``: longest time after such a silence for which a motion waits for a heading. A
+heading of exactly zero shows a restart.
+"""
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
 
@@ -168,7 +176,8 @@ class Ground:
         self._obstacle_told = False
         self._stray_s = self._swept_s = self._stood_s = -math.inf
         self._negative_sweep = self._rescue = self._runs_on = False
-        self._rested_s = -math.inf
+        self._rested_s = self._obeyed_s = -math.inf
+        self._probes = False
         self._counted_at_rest = 0
         self._fresh = False
         self._conflict = self._released = self._lost_told = False
@@ -177,7 +186,7 @@ class Ground:
         self._greeted_s = -math.inf
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
-        self.heard_s = self.appeared_s = -math.inf
+        self.heard_s = self.appeared_s = self._gap_s = -math.inf
         self.greeted = False
         self.began_s: float | None = None
         self._next_s = -math.inf
@@ -240,7 +249,15 @@ class Ground:
             self._appears(now)
         if now - self.heard_s > RESTARTED_S:
             self.health.was_silent()
+        told = self.odometry.heading.told_s >= self._gap_s  # a heading has come since the last gap
+        if self.state is State.STILL and told and self._is_quiet(now):
+            self._gap_s = now
+            self._polls.press(words.RMRA)
         self.heard_s = now
+
+    def _is_quiet(self, now: float) -> bool:
+        """Return whether a server at rest has been silent for so long that it may be restarting."""
+        return now - self.heard_s > GAP_S + 2 * self.conversation.answered_trip_s
 
     def _appears(self, now: float) -> None:
         """Record that the server may have been restarted, and that its log may be lost."""

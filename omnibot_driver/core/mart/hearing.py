@@ -173,7 +173,9 @@ class Hearing(Measuring):
         elif word.kind is Kind.CHANGE:
             if isinstance(reply, Fail):
                 self._halt(now, self._obstacle(reply, self.motion))
-            elif reply.form is Form.DECIMAL:
+                return
+            self._obeyed_s = now
+            if reply.form is Form.DECIMAL:
                 self._turned(reply.number, answer.when, now)
         elif word.kind is Kind.MOVE:
             self._moved(reply, now, sure=not answer.when.doubtful)
@@ -185,6 +187,8 @@ class Hearing(Measuring):
         elif word in (words.MCS, words.MSM):
             self._switch_off.answered(word, reply)
             self._rescue &= not self._switch_off.underway
+            if word is words.MCS and self._runs_on and self._switch_off.underway:
+                self._rolled = True  # the robot coasts after MCS, not after the stop before it
         else:
             self.jobs.answered(answer, now)
             self.state = State.SERVING if self.jobs.collecting else State.STILL
@@ -207,6 +211,8 @@ class Hearing(Measuring):
         elif word.kind is Kind.SERVICE:
             self.state = State.STILL
             self.jobs.missed(word, now)
+        elif word.kind is Kind.CHANGE and self._probes:
+            return  # nothing was to be changed
         elif word.kind is Kind.CHANGE:
             self.loop.missed()
             if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:

@@ -50,6 +50,7 @@ class Measuring(Starts):
             if self._shows_restart(before_rad):
                 if before_rad is not None:
                     self.health.restarted()
+                    self._appears(now)
                 self.jobs.forget_log()
             elif reply.number and self._started_s < self.appeared_s <= answer.when.from_s:
                 self.jobs.log_may_be_lost = False  # a restarted server reports zero until RM

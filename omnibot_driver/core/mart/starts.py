@@ -15,6 +15,7 @@ from omnibot_driver.core.mart.conversation import SLOW_S, Answer
 from omnibot_driver.core.mart.failed_starts import AGAIN_S, FailedStarts
 from omnibot_driver.core.mart.ground import (
     ESTOP_REPEAT_S,
+    GAP_LONGEST_S,
     GREET_S,
     STARTS_UP_S,
 )
@@ -62,6 +63,8 @@ class Starts(FailedStarts):
             self._estop_said_s = now
             self.proof.stopped(now)
             return self._send(HALTS[Motion.UNKNOWN], now)
+        if self._runs_on and self._switch_off.needed:
+            return self._switch_motors_off(now)  # MCS is safe while the server starts up
         if now < self.appeared_s + STARTS_UP_S:
             return NO_PACKETS
         if self._switch_off.underway or switch_off:
@@ -160,10 +163,14 @@ class Starts(FailedStarts):
         """Return the request that checks the IMU; no packets while it must wait.
 
         It waits until the check is due. It also waits while a late reply to another request could
-        be mistaken for the reply to the check.
+        be mistaken for the reply to the check. After a short silence, it waits for a heading, which
+        shows whether the server was restarted.
         """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
+            return NO_PACKETS
+        waits = self.odometry.heading.told_s < self._gap_s and now < self._gap_s + GAP_LONGEST_S
+        if waits or self._is_quiet(now):
             return NO_PACKETS
         self._require(word)
         self.state = State.CHECKING

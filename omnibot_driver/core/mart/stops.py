@@ -250,6 +250,8 @@ class Stops(Ground, ABC):
                 self._appears(now)  # the server knows of no motion, so maybe it was restarted
         if result is None:
             self._switch_off.doubt()
+            # the motion had begun, but the server knows of none: the motors may run on
+            self._runs_on |= motion in UNCONTROLLED and self._begun_s >= self._started_s
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
             self._swept_s = now

@@ -332,3 +332,67 @@ def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: 
     bench.server.restart(0.5)
     bench.command(0.0, 0.0, 0.5)
     assert bench.until_it_stands() < 8.5
+
+
+@pytest.mark.parametrize(
+    "motion", [(-0.2, 0.0), (0.3, 0.0), (0.2, 0.3)], ids=["backward", "forward", "curve"]
+)
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarted(
+    firmware: Firmware, motion: tuple[float, float]
+) -> None:
+    """The server restarts in a drive within 0.1 s, and the motors keep running.
+
+    The server answers the stop with "no motion", because it has forgotten the drive. The driver
+    then switches the motors off with MCS at once, while the server still starts up.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 2.5)
+    bench.server.restart(0.1)
+    bench.command(*motion, 0.2)
+    assert not bench.robot.stands
+    bench.estop(True)
+    assert bench.until_it_stands() < 1.0
+    bench.run(3.0)
+    assert bench.robot.stands
+    assert not bench.server.crashed
+
+
+@pytest.mark.parametrize("boot_s", [0.05, 0.4])
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot_s: float) -> None:
+    """The server restarts quickly in B, and the motors keep running.
+
+    The server no longer stops the robot in front of an obstacle. The encoder does not show the
+    restart. The driver sends ``CS 0 0`` once a second; the server refuses it, and the driver begins
+    the drive anew.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(-0.2, 0.0, 4.0)
+    since = len(bench.written)
+    bench.server.restart(boot_s)
+    bench.command(-0.2, 0.0, 8.0)
+    assert b"B SLOW" in bench.said(since)
+    assert not bench.server.crashed
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("wait_s", [0.0, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("boot_s", [0.15, 0.2, 0.3, 0.45])
+def test_a_quick_restart_at_rest_is_noticed_before_the_next_motion(
+    boot_s: float, wait_s: float
+) -> None:
+    """The server restarts at rest in less than 0.5 s, which is not regarded as an absence.
+
+    After each short silence, the driver waits for the heading before it begins a motion. The
+    heading is zero after a restart. So the driver waits until the server has started up.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.2, 0.3, 1.5)
+    bench.run(2.0)
+    bench.server.restart(boot_s)
+    bench.run(boot_s + wait_s)
+    bench.command(0.3, 0.0, 1.0)
+    assert not bench.server.crashed
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
