@@ -182,7 +182,7 @@ class Ground:
         self._fresh = False
         self._conflict = self._released = self._lost_told = False
         self._asked_count: tuple[int, float] | None = None
-        self._greet_s = self._free_s = math.inf
+        self._greet_s = self._free_s = self._name_awaited_s = math.inf
         self._greeted_s = -math.inf
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()

@@ -36,6 +36,13 @@ from omnibot_driver.core.mart.switch_off import RELEASE
 from omnibot_driver.core.mart.words import Form, Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
+NAME_WAIT_S: Final = 2.0
+"""Longest time in s for which a controlled move waits until no earlier HELLO can arrive after it.
+
+On a network that loses many datagrams, the driver sends HELLO so often that this time would never
+come. After this wait, the answer to HELLO proves nothing about a duplicate of the move
+(``_greeted_before``).
+"""
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
@@ -137,8 +144,13 @@ class Starts(FailedStarts):
         The result is False for other starts. It is also False after a fresh check of the IMU: the
         driver has waited before the check, so no earlier HELLO can arrive.
         """
-        moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
-        return moves and now < self._greeted_s + self._delay_s
+        if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
+            return False
+        if now >= self._greeted_s + self._delay_s:
+            self._name_awaited_s = math.inf
+            return False
+        self._name_awaited_s = min(self._name_awaited_s, now)
+        return now < self._name_awaited_s + NAME_WAIT_S
 
     def _next_start(self, now: float) -> Request | None:
         order = self._order(now)
@@ -208,6 +220,7 @@ class Starts(FailedStarts):
         self._port_free_s, self._start_owed_until_s = math.inf, -math.inf
         self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused, self._runs_on = start.word, False, False
+        self._name_awaited_s = math.inf
         self._started_s = self._present_s = now
         self.imu.used()
         _, twist = self._wish(now)

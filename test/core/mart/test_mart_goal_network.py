@@ -37,6 +37,17 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
         assert bench.error.way_m < 0.1
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed: int) -> None:
+    """A quarter of all datagrams is lost, so the driver sends HELLO several times a second.
+
+    Before a move, the driver waits until no HELLO is on its way, but not for ever. The goal is
+    reached or discarded.
+    """
+    bench = on(NetworkFaults(lose=0.25, delay_s=0.01), EVERY_FIRMWARE[seed % 3], seed)
+    reach(bench, Pose(0.6, 0.3, 1.5))
+
+
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
     """A tenth of all datagrams is lost in each direction. At most one of twelve goals is discarded.
 
