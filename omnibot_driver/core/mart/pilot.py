@@ -111,9 +111,13 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is busy. The driver expects no reply from a busy server."""
-        if self._stopping is not None:
-            return self.greeted and now < self._stopping.began_s + STOPS_S
+        """Return whether the server is busy. The driver expects no reply from a busy server.
+
+        A server that was silent before the stop of a drive is not busy: it may be lost.
+        """
+        if (stopping := self._stopping) is not None:
+            silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
+            return self.greeted and not silent and now < stopping.began_s + STOPS_S
         if self.state is State.MOVING:
             return True
         answers = self.heard_s >= self.conversation.missed_s

@@ -222,3 +222,19 @@ def test_the_e_stop_repeats_the_stop_of_a_lost_server_at_once() -> None:
     bench.estop(True)
     bench.run(0.02)
     assert bench.said(said)[:1] == [b"SRM"]
+
+
+@pytest.mark.parametrize("motion", [(0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)])
+def test_a_server_that_is_lost_in_a_drive_is_reported_after_one_and_a_half_seconds(
+    motion: tuple[float, float],
+) -> None:
+    """The network is cut while the robot drives.
+
+    The driver begins to stop the robot 0.8 s later. It does not expect a busy server then, so the
+    state is ``connecting`` 1.5 s after the last reply.
+    """
+    bench = MartBench("source").ready()
+    bench.command(*motion, 2.0)
+    bench.hears = bench.speaks = False
+    bench.command(*motion, 1.7)
+    assert bench.session.state == "connecting"
