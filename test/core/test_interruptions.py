@@ -72,6 +72,30 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
     assert way.yaw_rad == pytest.approx(odom_way.yaw_rad, abs=0.025)
 
 
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
+    """The board is paused and restarts unheard. The first count that is heard exceeds the old one.
+
+    The robot stands still. Odom does not move to the board's new origin.
+    """
+    on = line(0, frame=frame)
+    on.drives = False
+    on.run(0.5)
+    on.board.receive(b"P")
+    on.run(1.1)
+    before = on.estimates[-1].pose
+    on.loses = lambda _data, _now: True
+    on.board.receive(b"R")
+    on.run(1.0)
+    on.board.receive(bytes(3) + b"S")
+    on.run(4.0)
+    on.loses = loses_nothing
+    on.run(1.0)
+    way = before.way_to(on.estimates[-1].pose)
+    assert way.way_m < 0.001
+    assert abs(way.yaw_rad) < 0.001
+
+
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
     """The board restarts while the robot drives, so it is unknown how far the robot rolled.
 

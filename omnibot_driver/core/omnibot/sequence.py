@@ -93,7 +93,11 @@ class Sequence:
         time of this counter in s, and the first counter after the restart."""
 
     def pause(self) -> None:
-        """Record that the board paused. Its counters may then continue, or restart at zero."""
+        """Record that the board paused. Its counters may then continue, or restart at zero.
+
+        The duration of the pause is unknown. So any other count than the next one may be that of a
+        restarted board whose first deltas were lost.
+        """
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
@@ -118,7 +122,7 @@ class Sequence:
             return Step(0, None if paused else period_s)
         lost = (count - before - 1) % WRAP
         if paused:
-            return Step(0, None, restarted=count <= lost)
+            return Step(0, None, restarted=lost > 0 or count == 0)
         wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
         lost += wraps * WRAP
         late_s = abs((lost + 1) * period_s - elapsed_s)
