@@ -13,7 +13,7 @@ from lossy_drives import (
     lose,
     settled,
 )
-from lossy_odometry import DELTA, POSE, TEXT, loses_nothing
+from lossy_odometry import DELTA, POSE, TEXT, Line, loses_nothing
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.estimate import OdometrySettings
@@ -21,6 +21,7 @@ from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.omnibot import DeltaFrame, ImuFrame, OmniBot, OmniBotSettings, encode
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
+from omnibot_driver.simulator.omnibot import BoardSettings
 
 # Pauses and restarts
 
@@ -94,6 +95,29 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
     way = before.way_to(on.estimates[-1].pose)
     assert way.way_m < 0.001
     assert abs(way.yaw_rad) < 0.001
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+def test_a_restarted_board_that_first_moves_unheard_does_not_move_odom_to_its_origin(
+    frame: str,
+) -> None:
+    """The board restarts and drives for 0.4 s before its frames are heard again.
+
+    So its first poses are neither at its new origin nor at the old place, although the robot could
+    have reached them without a restart. Odom continues from its last pose.
+    """
+    on = Line(BoardSettings(seed=1, frame=frame, running=True), seed=1)
+    on.run(4.0)
+    before = on.estimates[-1].pose
+    assert before.way_m > 0.5
+    on.loses = lambda _data, _now: True
+    on.board.receive(b"R")
+    on.run(0.9)
+    on.board.receive(bytes(3) + b"S")
+    on.run(0.4)
+    on.loses = loses_nothing
+    (first, *_) = on.run(0.3)
+    assert before.way_to(first.pose).way_m < 0.02
 
 
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:

@@ -58,6 +58,8 @@ class StreamStatistics:
     added.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
+    _restarted: bool = field(default=False, repr=False)
+    """Whether a displacement since the last pose has shown a restart. The pose may show it too."""
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
         """Count the readings of one read. ``delay_s``: age of its newest sample, in s.
@@ -80,10 +82,12 @@ class StreamStatistics:
             elif isinstance(reading, DisplacementReading):
                 self.displacements += 1
                 self._miss(reading.lost, reading.restarted)
+                self._restarted |= reading.restarted
                 self._miss_imus(reading)
             elif isinstance(reading, PoseReading):
                 self.poses += 1
-                self._miss(reading.lost, reading.restarted)
+                self._miss(reading.lost, reading.restarted and not self._restarted)
+                self._restarted = False
                 if self._sent_imu is not None:  # the next displacement does not count these
                     self._sent_imu += reading.lost * self._imus_per_displacement
             else:

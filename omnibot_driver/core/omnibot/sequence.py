@@ -68,7 +68,10 @@ class Sequence:
         self._delta: int | None = None
         self._delta_at = 0.0
         self._pose: int | None = None
+        self._pose_at = 0.0
         self._since_pose = 0
+        self._renewed = False
+        """Whether the counter of the deltas seems to have restarted since the last pose."""
         self._told = 0
         self._regular = False
         """Whether a pose has ever come after the expected number of deltas.
@@ -131,7 +134,7 @@ class Sequence:
             self._pose = None  # the number of wraps is not known, so poses cannot be compared
         from_zero = count * period_s <= elapsed_s + EARLY_S
         if lost and late_s > latest_late_s and (reconnected or from_zero):
-            self._pose, self._left = None, (before, before_at, count)
+            self._renewed, self._left = True, (before, before_at, count)
             return Step(0, None, restarted=True)
         latest_s = (lost + 1) * period_s - (
             period_s / 2 if imus == self._imus_per_delta else latest_late_s
@@ -163,26 +166,32 @@ class Sequence:
             return Step(0)  # the next delta counts the losses from before and after this pose
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
+        renewed, self._renewed = self._renewed, False
+        elapsed_s, self._pose_at = now - self._pose_at, now
         if before is None or self._delta is None:
             return Step(0)
         passed = (count - before) % WRAP * self._per_pose
         self._regular = self._regular or 0 < passed == counted
         if not self._regular:
             return Step(0)
+        most_off: float = 2 * self._per_pose
+        if renewed:  # the time shows where the old counter would be now
+            counted = round(elapsed_s / self._period_s)
+            most_off = (LATE_S + DRIFT * elapsed_s) / self._period_s
         missing = max(0, passed - counted)
-        elapsed_s = now - self._delta_at
-        in_time = (self._told + missing) * self._period_s <= elapsed_s + self._period_s
+        time_s = now - self._delta_at + self._period_s
+        in_time = (self._told + missing) * self._period_s <= time_s
         delta = self._delta if self._ahead is None else self._ahead
         from_zero = abs(count * self._per_pose - delta) <= self._per_pose
         goes_on = passed == self._per_pose
         goes_on = goes_on or (in_time and missing * self._period_s > LONG_GAP_S)
         wrap = WRAP * self._per_pose
         off = (passed - counted) % wrap
-        if from_zero and not goes_on and min(off, wrap - off) > 2 * self._per_pose:
+        if from_zero and not goes_on and min(off, wrap - off) > most_off:
             self._delta, self._ahead, self.ambiguous = delta, None, False
             return Step(0, None, restarted=True)
-        if not in_time:
-            return Step(0)  # too little time has passed for these losses
+        if renewed or not in_time:
+            return Step(0)  # too little time has passed for these losses, or they are unknown
         self._told += missing
         return Step(missing)
 

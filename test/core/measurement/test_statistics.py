@@ -41,3 +41,19 @@ def test_a_pause_loses_nothing() -> None:
     bench.run_until_state("nominal")
     bench.run(2.0)
     assert lost(bench) == (0, 0)
+
+
+def test_a_restart_that_a_delta_and_a_pose_show_counts_once() -> None:
+    """The board restarts. First the count of a delta shows it, then that of a pose."""
+    bench = Bench(BoardSettings(running=True))
+    bench.open()
+    bench.run(8.0)
+    bench.speaks = False
+    bench.board.receive(b"R")
+    bench.run(0.9)
+    bench.board.receive(bytes(3) + b"S")
+    bench.run(0.2)
+    bench.speaks = True
+    bench.run(2.0)
+    assert bench.session.state == "nominal"
+    assert bench.session.figures(bench.now).tally.restarts == 1

@@ -80,6 +80,26 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
     assert not sequence.ambiguous
 
 
+@pytest.mark.parametrize(("number", "restarted"), [(2, True), (51, False), (30, False)])
+def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_begins_anew(
+    number: int, restarted: bool
+) -> None:
+    """The board sends 200 deltas. After 2.1 s, the count of a delta fits only a restart.
+
+    If the counter of the next pose continues from the old one, the count of the delta may be
+    damaged. If this counter fits neither case, it shows nothing. Only a counter from zero, too,
+    shows the restart.
+    """
+    sequence = Sequence()
+    for count in range(200):
+        sequence.delta(count, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    after_s = 199 * 0.04 + 2.1
+    assert sequence.delta(14, after_s).restarted
+    assert sequence.pose(number, after_s) == Step(0, None if restarted else 0.04, restarted)
+
+
 @pytest.mark.parametrize("lost", [1300, 2600])
 def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(lost: int) -> None:
     """More than 256 poses are lost, so the counter of the poses wraps. The gap lasts over 51.2 s.
