@@ -11,7 +11,7 @@ from lois_bench import Bench
 from lois_drives import HOST_GAINS
 
 from omnibot_driver.core.events import Notice
-from omnibot_driver.core.lois_ecu import Setting, encode_command
+from omnibot_driver.core.lois_ecu import SetRpm, Setting, encode_command
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.opening import ROUNDS, SettingsWriter
 from omnibot_driver.core.lois_ecu.outbound import STOP
@@ -129,6 +129,36 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
             followed.append(now - stopped_at_s)
         now += reads_s
     assert min(followed) >= (0.0149 if reads_s < 0.05 else 0.0)
+
+
+@pytest.mark.parametrize("waited_s", [0.1, 5.0])
+def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
+    """A round of settings waits while the robot drives. A Stop ends the drive.
+
+    The first setting is sent at the earliest 15 ms after the Stop. If the driver is called too
+    seldom for that, it is sent half a second after the Stop.
+
+    Bug: if the round had waited for more than half a second, the low-pass followed the Stop at
+    once.
+    """
+    settings = LoisEcuSettings()
+    points = SetPoints(settings)
+    writer = SettingsWriter(settings, points)
+    writer.begin(0.0)
+    now = 0.0
+    while not writer.done:
+        writer.due(now)
+        now += 0.01
+    points.wrote(encode_command(SetRpm(20, 20)), now)
+    writer.repeat(now)
+    now += waited_s
+    assert not writer.due(now)
+    points.wrote(encode_command(STOP), now)
+    assert writer.wake_at == pytest.approx(now + 0.015)
+    assert not writer.due(now)
+    for count in range(1, 11):
+        points.wrote(encode_command(STOP), now + 0.05 * count)
+        assert bool(writer.due(now + 0.05 * count)) == (count == 10)
 
 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
