@@ -68,15 +68,17 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
 
 
 @pytest.mark.parametrize(
-    ("ambiguous", "told_m", "x_m"), [(True, 0.0, 0.3), (True, 0.05, 0.05), (False, 0.0, 0.0)]
+    ("ambiguous", "told_m", "x_m"),
+    [(True, 0.0, 0.3), (True, 0.002, 0.3), (True, 0.01, 0.01), (False, 0.0, 0.0)],
 )
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     ambiguous: bool, told_m: float, x_m: float
 ) -> None:
     """The board restarts in a gap, and both of its counters fit the gap by chance.
 
-    A pose exactly at the new origin shows the restart, so odom stays. A pose beside it, or with
-    counters that exclude a restart, shows that the robot drove there in the gap.
+    A pose exactly at the new origin, except for rounding, shows the restart, so odom stays. A pose
+    1 cm beside it shows that the robot drove there in the gap: home, to the place where the board
+    was switched on. So does a pose whose counters exclude a restart.
     """
     odometry, estimates = Odometry(SETTINGS), []
     for number in range(75):

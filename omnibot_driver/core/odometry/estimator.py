@@ -20,7 +20,7 @@ from omnibot_driver.core.odometry.pending_displacements import (
     advanced,
     chord,
 )
-from omnibot_driver.core.odometry.pose_gate import BELIEVED_M, BELIEVED_TURN_RAD, expected
+from omnibot_driver.core.odometry.pose_gate import expected
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 LONGEST_WAIT_S: Final = 1.0
@@ -35,6 +35,12 @@ of the board. The pose shows the lost motion."""
 POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
+BEGUN_M: Final = 0.005
+BEGUN_RAD: Final = 0.01
+"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations from zero, in m and rad, of a pose that shows a
+restart by its value alone. A board begins at exactly zero, so only rounding, and the motion since
+the restart, make a difference. A robot that drives home during a gap rarely stops so near to zero.
+"""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
@@ -244,7 +250,7 @@ class Odometry:
         """
         assert self._frame.pose is not None
         begun = self._backlog.before(told)
-        near = begun.way_m <= BELIEVED_M and abs(begun.yaw_rad) <= BELIEVED_TURN_RAD
+        near = begun.way_m <= BEGUN_M and abs(begun.yaw_rad) <= BEGUN_RAD
         return bool(self._backlog) and near and not expected(self._frame.pose, NOTHING)
 
     def _attach(self, told: Pose, lost: int) -> list[OdometryEstimate]:
