@@ -87,7 +87,7 @@ class PoseReading:
       DisplacementReading does not include them.
     * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame. A
       displacement before it may have shown the same restart.
-    * ``ambiguous``: whether the counters fit a restart in a long gap before this pose as well as a
+    * ``ambiguous``: whether the counters fit a restart in a gap before this pose as well as a
       loss of everything in this gap. Only the pose itself can then decide.
     """
 

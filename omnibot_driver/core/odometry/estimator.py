@@ -68,6 +68,9 @@ class Odometry:
         self._frame, self._gate = self._reckoning.frame, self._reckoning.frame.gate
         self.configure(settings)
         self._backlog = PendingDisplacements()
+        self._since_gap: Pose | None = None
+        """Motion since a gap that no displacement has waited for, as if the board had begun at zero
+        in this gap. None if a pose has arrived since then."""
         self._told_lost = 0
         """Number of lost displacements that an unconfirmed pose has shown, and that no displacement
         in ``_backlog`` counts yet."""
@@ -142,6 +145,10 @@ class Odometry:
         self._gate.displaced(reading, bridges=means_nothing)
         lost_s = reading.lost * (reading.duration_s or 0.0)
         if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
+            if reading.lost:
+                self._since_gap = Pose()
+            if self._since_gap is not None:
+                self._since_gap = advanced(self._since_gap, reading)
             return [*estimates, self._reckoning.integrate(reading, stamp_s)]
         if reading.duration_s is not None:
             reading = replace(reading, lost=reading.lost + self._told_lost)
@@ -161,6 +168,7 @@ class Odometry:
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not self._gate.possible(told):
             return []
+        since_gap, self._since_gap = self._since_gap, None
         confirmed = self._gate.confirmed(told, self._track.uncertainty.gap)
         restarted = reading.restarted and (
             bool(self._backlog) or not self._frame.continues(told, self._track.uncertainty.gap)
@@ -187,7 +195,12 @@ class Odometry:
         estimates = self._release()
         if lost:
             self._reckoning.bridge_until_pose(lost)
-        if self._settings.use_board_pose:
+        if reading.ambiguous and since_gap is not None and self._is_at_origin(since_gap, told):
+            self._track.uncertainty.give_up()
+            self._begin_at(told)
+            self._bridge.prove()
+            self._gate.believe(told)
+        elif self._settings.use_board_pose:
             self._judge(told, confirmed)
         return estimates
 
@@ -249,9 +262,17 @@ class Odometry:
         near zero before the gap. The counters do not decide, because they fit both cases.
         """
         assert self._frame.pose is not None
-        begun = self._backlog.before(told)
-        near = begun.way_m <= BEGUN_M and abs(begun.yaw_rad) <= BEGUN_RAD
+        near = _is_zero(self._backlog.before(told))
         return bool(self._backlog) and near and not expected(self._frame.pose, NOTHING)
+
+    def _is_at_origin(self, since_gap: Pose, told: Pose) -> bool:
+        """Return whether the board began a new frame in a gap that was too short to wait for.
+
+        ``since_gap``: motion since this gap, from zero in the board's frame.
+        """
+        assert self._frame.pose is not None
+        went_on = expected(self._frame.pose.way_to(told), self._track.uncertainty.gap)
+        return _is_zero(since_gap.way_to(told)) and not went_on
 
     def _attach(self, told: Pose, lost: int) -> list[OdometryEstimate]:
         """Adopt a new frame of the board. The odometry continues from its current pose.
@@ -347,3 +368,7 @@ class Odometry:
         return [
             self._reckoning.integrate(reading, stamp_s) for reading, stamp_s in self._backlog.take()
         ]
+
+
+def _is_zero(pose: Pose) -> bool:
+    return pose.way_m <= BEGUN_M and abs(pose.yaw_rad) <= BEGUN_RAD

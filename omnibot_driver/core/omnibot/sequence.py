@@ -86,10 +86,10 @@ class Sequence:
         number of lost deltas is computed from the elapsed time.
         """
         self.ambiguous = False
-        """Whether both counters, at the last pose, fit a restart in the long gap before this pose
+        """Whether both counters, at the last pose, fit a restart in the gap before this pose
         as well as a loss of all deltas in this gap."""
         self._may_be_new = False
-        """Whether a long gap has ended since the last pose, and the counter of the delta after it
+        """Whether a gap has ended since the last pose, and the counter of the delta after it
         also fits a counter that began at zero in this gap."""
         self._left: tuple[int, float, int] | None = None
         """What is needed to withdraw a supposed restart: the last counter before it, the arrival
@@ -148,7 +148,7 @@ class Sequence:
         elif ahead and lost >= WRAP - per_pose:
             lost = in_time  # not a wrap: a false delta was counted before
         lost -= min(lost, told)
-        self._may_be_new |= from_zero and lost * period_s > LONG_GAP_S
+        self._may_be_new |= from_zero and lost > 0
         self._since_pose += lost + 1
         return Step(lost, period_s)
 
