@@ -37,7 +37,10 @@ SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
 FRESH_S: Final = 0.1
-"""Age in s up to which wheel speeds are used."""
+"""Age in s up to which wheel speeds are used.
+
+It is measured by the board's time, because lines may wait to be read.
+"""
 LEAST_S: Final = 0.001
 STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
@@ -98,7 +101,10 @@ class PoseOdometry:
         self._jump: _Jump | None = None
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
-        self._speeds_at = -math.inf
+        self._speeds_s = self._time_s = -math.inf
+        self._speeds_new = False
+        """Board times, in s, of the first pose after the last wheel speeds, and of the last pose.
+        ``_speeds_new``: whether no pose has arrived since the last wheel speeds."""
 
     @property
     def moving(self) -> bool:
@@ -114,11 +120,11 @@ class PoseOdometry:
         self._pose = None
         self.begin()
 
-    def speeds(self, speeds: WheelSpeeds, now: float) -> None:
+    def speeds(self, speeds: WheelSpeeds) -> None:
         """Receive the speeds of both wheels."""
-        self._before, self._speeds, self._speeds_at = self._speeds, speeds, now
+        self._before, self._speeds, self._speeds_new = self._speeds, speeds, True
 
-    def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
+    def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
         """Return the displacement from the previous pose to ``pose``, in a list.
 
         The list is empty if there is no displacement (see the method ``pose``).
@@ -128,7 +134,7 @@ class PoseOdometry:
         began, plus all displacements that were returned since then. Displacements that a later
         check rejects are included.
         """
-        displacement = self.pose(pose, now)
+        displacement = self.pose(pose)
         if displacement is None:
             return []
         is_new = displacement.restarted or self._moved
@@ -138,13 +144,15 @@ class PoseOdometry:
         place, moved, self._moved = self._told, self._moved, False
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad, restarted=moved)]
 
-    def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
+    def pose(self, pose: BoardPose) -> DisplacementReading | None:
         """Return the displacement from the previous pose to ``pose``; None if ``pose`` is rejected.
 
         For the first pose after the start of the driver, the result is None too, because there is
         no previous pose. For the first pose after a restart of the board, the displacement is 0.
         """
-        before = self._pose
+        before, self._time_s = self._pose, pose.time_s
+        if self._speeds_new:
+            self._speeds_s, self._speeds_new = pose.time_s, False
         if before is None:
             self._begin_at(pose)
             restarted, self._restarted = self._restarted, False
@@ -152,10 +160,10 @@ class PoseOdometry:
             return nothing if restarted else None
         seconds = pose.time_s - before.time_s
         way = log_of(self._told.way_to(_place(pose)))
-        if seconds < LEAST_S or not self._explained(way, seconds, now):
-            return self._doubt(pose, seconds, now)
+        if seconds < LEAST_S or not self._explained(way, seconds):
+            return self._doubt(pose, seconds)
         self._doubted, self._agreed, self._jump = None, 0, None
-        displacement = self._drawn(way, seconds, pose.decimals, now)
+        displacement = self._drawn(way, seconds, pose.decimals)
         self._pose = pose
         self._told = self._told.moved(roll(displacement))
         return _reading(displacement, seconds)
@@ -164,24 +172,24 @@ class PoseOdometry:
         self._pose, self._told = pose, _place(pose)
         self._doubted, self._agreed, self._jump = None, 0, None
 
-    def _doubt(self, pose: BoardPose, since_s: float, now: float) -> DisplacementReading | None:
+    def _doubt(self, pose: BoardPose, since_s: float) -> DisplacementReading | None:
         before, self._doubted = self._doubted, pose
         self.refused += 1
         if self._pose is None:
             return None
         if before is None:
-            self._jump = self._jump_at(pose, since_s, now)
+            self._jump = self._jump_at(pose, since_s)
             return None
         seconds = pose.time_s - before.time_s
         way = log_of(_place(before).way_to(_place(pose)))
         if seconds < LEAST_S or not _possible(way, seconds):
-            self._agreed, self._jump = 0, self._jump_at(pose, since_s, now)
+            self._agreed, self._jump = 0, self._jump_at(pose, since_s)
             return None
         # Two rejected poses agree. If the robot can have reached the second, it is accepted.
         # Otherwise, the board may have begun a new coordinate frame (command ``enc0``).
         whole = log_of(self._told.way_to(_place(pose)))
         self._agreed += 1
-        rolled = self._rolled(seconds, now)
+        rolled = self._rolled(seconds)
         if self._jump is not None and rolled is not None and self._near(way - rolled, seconds):
             # The board computes poses and wheel speeds from the same encoders. So the poses have a
             # new origin, even if the robot could have driven to this place.
@@ -197,7 +205,7 @@ class PoseOdometry:
             way.x_m, way.y_m, way.yaw_rad, "body", seconds, 0, restarted=True
         )
 
-    def _jump_at(self, pose: BoardPose, since_s: float, now: float) -> _Jump | None:
+    def _jump_at(self, pose: BoardPose, since_s: float) -> _Jump | None:
         """Return the jump that begins with this rejected pose; None if it may not be one.
 
         ``since_s``: time in s since the last accepted pose.
@@ -206,7 +214,7 @@ class PoseOdometry:
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)
         if digit_m > SLACK_M or since_s < LEAST_S:  # rounding alone can contradict the wheels
             return None
-        rolled = self._rolled(since_s, now)
+        rolled = self._rolled(since_s)
         return None if rolled is None else _Jump(pose, rolled)
 
     def _in_moved_frame(
@@ -219,14 +227,14 @@ class PoseOdometry:
         self._moved = True
         return _reading(log_of(way), since_s)
 
-    def _rolled(self, seconds: float, now: float) -> Pose | None:
+    def _rolled(self, seconds: float) -> Pose | None:
         """Return the motion in ``seconds``, computed from the last two pairs of wheel speeds.
 
         The speed of each wheel is the mean of its last two speeds. The result is None if the last
         pair is too old, or if ``seconds`` exceeds ``FRESH_S``.
         """
         speeds = self._speeds
-        if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:
+        if speeds is None or self._time_s - self._speeds_s > FRESH_S or seconds > FRESH_S:
             return None
         before = self._before or speeds
         left = (speeds.left_mps + before.left_mps) / 2
@@ -235,10 +243,10 @@ class PoseOdometry:
             seconds, seconds, seconds
         )
 
-    def _explained(self, way: Pose, seconds: float, now: float) -> bool:
+    def _explained(self, way: Pose, seconds: float) -> bool:
         if not _possible(way, seconds):
             return False
-        rolled = self._rolled(seconds, now)
+        rolled = self._rolled(seconds)
         if rolled is None:  # after a gap the next pose must confirm a large step
             return seconds <= FRESH_S or (way.way_m <= SLACK_M and abs(way.yaw_rad) <= SLACK_RAD)
         return self._near(way - rolled, seconds)
@@ -247,8 +255,8 @@ class PoseOdometry:
         slack_m = SLACK_M + SPEED_UP_MPS2 * seconds * seconds
         return off.way_m <= slack_m and abs(off.yaw_rad) <= SLACK_RAD + slack_m / self.track_m
 
-    def _drawn(self, way: Pose, seconds: float, decimals: int, now: float) -> Pose:
-        rolled = self._rolled(seconds, now)
+    def _drawn(self, way: Pose, seconds: float, decimals: int) -> Pose:
+        rolled = self._rolled(seconds)
         if rolled is None:
             return way
         off = way - rolled

@@ -122,12 +122,12 @@ class Translation:
             case BoardPose():
                 self._pairs.pose(message.time_s)
                 stamp_s = clock.host_s(message.time_s)
-                for reading in self.odometry.readings(message, now):
+                for reading in self.odometry.readings(message):
                     self.stamped.add(reading, stamp_s, now)
                 self.settle(clock, now)
             case WheelSpeeds():
                 self._pairs.other("vel")
-                self.odometry.speeds(message, now)
+                self.odometry.speeds(message)
             case Gyro():
                 self._pairs.gyro(message, now)
             case Acceleration():

@@ -43,7 +43,7 @@ class Drive:
         self.with_speeds = with_speeds
 
     def say(self, pose: BoardPose) -> DisplacementReading | None:
-        reading = self.odometry.pose(pose, self.now)
+        reading = self.odometry.pose(pose)
         if reading is not None:
             self.readings.append(reading)
             self.out = self.out.moved(roll(Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)))
@@ -56,7 +56,7 @@ class Drive:
             return
         if self.with_speeds:
             half = w * TRACK_M / 2
-            self.odometry.speeds(WheelSpeeds(round(v - half, 3), round(v + half, 3)), self.now)
+            self.odometry.speeds(WheelSpeeds(round(v - half, 3), round(v + half, 3)))
         self.say(told(self.board, self.now))
 
     def run(self, v: float, w: float, seconds: float, *, heard: bool = True) -> None:
@@ -167,6 +167,25 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
     assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
 
 
+@pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
+def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
+    """On a slow computer the driver reads every 0.15 s, and another program sends ``enc0``.
+
+    Regression: the driver measured the age of wheel speeds by their time of arrival. So it had no
+    wheel speeds for the first pose of a read, and ``odom`` went back by the way driven.
+    """
+    bench = nominal()
+    bench.drive_on(0.5, 0.3, 0.6)
+    bench.read_s = 0.15
+    bench.run(wait_s)
+    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+    bench.run(1.5)
+    last, truth = bench.odometry[-1], bench.robot.truth
+    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
+    assert off.way_m < 0.02
+    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
+
+
 def test_a_pose_set_to_zero_at_rest_does_not_move_the_odometry() -> None:
     """If another program sends ``enc0`` while the robot stands, ``odom`` stays where it is."""
     bench = nominal()
@@ -188,7 +207,7 @@ def test_a_pose_with_coarse_digits_is_no_new_frame() -> None:
     drive = Drive()
     for _ in range(400):
         drive.step(0.3, 0.0, heard=False)
-        drive.odometry.speeds(WheelSpeeds(0.3, 0.3), drive.now)
+        drive.odometry.speeds(WheelSpeeds(0.3, 0.3))
         place = drive.board
         drive.say(BoardPose(round(drive.now, 5), round(place.x_m, 1), 0.0, 0.0, 1))
     assert drive.out.x_m == pytest.approx(2.4, abs=0.11)

@@ -50,7 +50,7 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
     poses: list[BoardPose] = []
     readings = bench.board._translation.odometry.readings
     bench.board._translation.odometry.readings = (  # type: ignore[method-assign]
-        lambda pose, now: (poses.append(pose), readings(pose, now))[1]
+        lambda pose: (poses.append(pose), readings(pose))[1]
     )
     bench.session.inbound.receive(pose + start, bench.now, DRIVE)
     assert [one.time_s for one in poses] == [pytest.approx(drive.clock_s, abs=0.001)]
