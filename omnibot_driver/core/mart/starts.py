@@ -84,6 +84,7 @@ class Starts(FailedStarts):
         if self._switch_off.needed and (start is None or now < self._again_s or self.refusal):
             return self._switch_motors_off(now)
         if start is None:
+            self._name_awaited_s = math.inf  # the next move has its own wait
             return self._job(now)
         if now < self._again_s:
             return NO_PACKETS

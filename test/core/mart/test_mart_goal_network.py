@@ -48,6 +48,25 @@ def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed
     reach(bench, Pose(0.6, 0.3, 1.5))
 
 
+def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -> None:
+    """The driver has just sent HELLO, so a move waits; the goal is cancelled in this wait.
+
+    Regression: the limit of 2 s was still counted from that wait, so the next move did not wait.
+    """
+    bench = MartBench("source").ready()
+    bench.go_to(0.3, 0.0, 0.0)
+    bench.run_until(lambda: bench.server.chassis.way_m > 0.1, 10.0)
+    bench.command(0.0, 0.0, 3.0)
+    pilot = bench.board._pilot
+    for _ in range(2):
+        pilot._greeted_s = bench.now
+        since = len(bench.written)
+        bench.go_to(0.8, 0.0, 0.0)
+        bench.run(0.2)
+        assert not any(text.startswith((b"TF", b"MCR", b"MCL")) for text in bench.said(since))
+        bench.command(0.0, 0.0, 3.0)
+
+
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
     """A tenth of all datagrams is lost in each direction. At most one of twelve goals is discarded.
 
