@@ -217,7 +217,8 @@ class FejemisTopics:
         # Even if the parameter was zero: the driver may have refined the gyro's bias.
         self._node.set_parameters([rclpy.Parameter(name, value=[0.0, 0.0, 0.0])])
         return (
-            f"; the driver's parameter {name} is now 0, so also remove it from your files"
+            f"; the driver's parameter {name} is now 0, so call ~/save_configuration, and remove"
+            f" {name} from your files"
             if was_set
             else ""
         )
