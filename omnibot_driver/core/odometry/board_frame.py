@@ -6,9 +6,18 @@ A board that restarts begins a new frame at the robot's place. This module does 
 odometry frame.
 """
 
+from typing import Final
+
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import NOTHING, Covariance
 from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
+
+BEGUN_M: Final = 0.005
+BEGUN_RAD: Final = 0.01
+"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations, in m and rad, of a pose that shows by its value
+alone that the board began at zero. Only rounding makes a difference. A robot that drives to the
+origin in a gap rarely stops so near to it.
+"""
 
 
 class BoardFrame:
@@ -24,6 +33,11 @@ class BoardFrame:
         self.pose: Pose | None = None
         self.since_restart: Pose | None = None
         self.gate = PoseGate()
+
+    @property
+    def is_away(self) -> bool:
+        """Whether the robot is away from the origin of the board's frame."""
+        return self.pose is not None and not expected(self.pose, NOTHING)
 
     def suspect_restart(self) -> None:
         """Suspect that the board has restarted just now, and so has begun a new frame."""
@@ -83,6 +97,14 @@ class BoardFrame:
             self.since_restart = None
             return False
         return confirmed
+
+
+def is_begun(deviation: Pose) -> bool:
+    """Return whether a pose shows by its value alone that the board began a new frame.
+
+    ``deviation``: from the pose that is expected if the board began at zero.
+    """
+    return deviation.way_m <= BEGUN_M and abs(deviation.yaw_rad) <= BEGUN_RAD
 
 
 def _size(way: Pose) -> float:

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
+from omnibot_driver.core.odometry.board_frame import is_begun
 from omnibot_driver.core.odometry.covariance import NOTHING
 from omnibot_driver.core.odometry.dead_reckoning import DeadReckoning
 from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
@@ -35,12 +36,6 @@ of the board. The pose shows the lost motion."""
 POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
-BEGUN_M: Final = 0.005
-BEGUN_RAD: Final = 0.01
-"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations from zero, in m and rad, of a pose that shows a
-restart by its value alone. A board begins at exactly zero, so only rounding, and the motion since
-the restart, make a difference. A robot that drives home during a gap rarely stops so near to zero.
-"""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
@@ -69,8 +64,8 @@ class Odometry:
         self.configure(settings)
         self._backlog = PendingDisplacements()
         self._since_gap: Pose | None = None
-        """Motion since a gap that no displacement has waited for, as if the board had begun at zero
-        in this gap. None if a pose has arrived since then."""
+        """Pose of a board that began a new frame in the last gap. None if a pose has arrived since
+        this gap, or if the robot was near the origin of the board's frame before it."""
         self._told_lost = 0
         """Number of lost displacements that an unconfirmed pose has shown, and that no displacement
         in ``_backlog`` counts yet."""
@@ -144,11 +139,11 @@ class Odometry:
         means_nothing = is_nowhere and reading.frame == "earth"
         self._gate.displaced(reading, bridges=means_nothing)
         lost_s = reading.lost * (reading.duration_s or 0.0)
+        if reading.lost and self._since_gap is None and self._frame.is_away:
+            self._since_gap = Pose()
+        if self._since_gap is not None:
+            self._since_gap = advanced(self._since_gap, reading)
         if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
-            if reading.lost:
-                self._since_gap = Pose()
-            if self._since_gap is not None:
-                self._since_gap = advanced(self._since_gap, reading)
             return [*estimates, self._reckoning.integrate(reading, stamp_s)]
         if reading.duration_s is not None:
             reading = replace(reading, lost=reading.lost + self._told_lost)
@@ -187,20 +182,15 @@ class Odometry:
         lost, self._told_lost = reading.lost + self._told_lost, 0
         lost_s = lost * self._bridge.last[1] if self._bridge.last else 0.0
         is_long = bool(self._backlog) or lost_s > LONG_GAP_S
-        if reading.ambiguous and self._has_begun_anew(told):
+        if reading.ambiguous and since_gap is not None and self._began_in_gap(told, since_gap):
             self._backlog.restart()
-            return self._attach(told, 0)
+            return self._attach(told, 0 if self._backlog else lost)
         if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
             return self._resume(told, lost_s)
         estimates = self._release()
         if lost:
             self._reckoning.bridge_until_pose(lost)
-        if reading.ambiguous and since_gap is not None and self._is_at_origin(since_gap, told):
-            self._track.uncertainty.give_up()
-            self._begin_at(told)
-            self._bridge.prove()
-            self._gate.believe(told)
-        elif self._settings.use_board_pose:
+        if self._settings.use_board_pose:
             self._judge(told, confirmed)
         return estimates
 
@@ -255,24 +245,17 @@ class Odometry:
             reachable=self._reachable(told),
         )
 
-    def _has_begun_anew(self, told: Pose) -> bool:
-        """Return whether the board began a new frame in the gap before the waiting displacements.
+    def _began_in_gap(self, told: Pose, since_gap: Pose) -> bool:
+        """Return whether a pose shows that the board began a new frame in the last gap.
 
-        It did if these displacements lead from zero to the pose ``told``, and the robot was not
-        near zero before the gap. The counters do not decide, because they fit both cases.
+        The counters do not decide, because they fit both cases. ``told``: the pose.
+
+        ``since_gap``: the pose that is expected if the board began a new frame.
         """
         assert self._frame.pose is not None
-        near = _is_zero(self._backlog.before(told))
-        return bool(self._backlog) and near and not expected(self._frame.pose, NOTHING)
-
-    def _is_at_origin(self, since_gap: Pose, told: Pose) -> bool:
-        """Return whether the board began a new frame in a gap that was too short to wait for.
-
-        ``since_gap``: motion since this gap, from zero in the board's frame.
-        """
-        assert self._frame.pose is not None
-        went_on = expected(self._frame.pose.way_to(told), self._track.uncertainty.gap)
-        return _is_zero(since_gap.way_to(told)) and not went_on
+        gap = self._track.uncertainty.gap
+        went_on = not self._backlog and expected(self._frame.pose.way_to(told), gap)
+        return is_begun(since_gap.way_to(told)) and not went_on
 
     def _attach(self, told: Pose, lost: int) -> list[OdometryEstimate]:
         """Adopt a new frame of the board. The odometry continues from its current pose.
@@ -368,7 +351,3 @@ class Odometry:
         return [
             self._reckoning.integrate(reading, stamp_s) for reading, stamp_s in self._backlog.take()
         ]
-
-
-def _is_zero(pose: Pose) -> bool:
-    return pose.way_m <= BEGUN_M and abs(pose.yaw_rad) <= BEGUN_RAD

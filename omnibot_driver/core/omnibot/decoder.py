@@ -316,6 +316,9 @@ class FrameDecoder:
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
         in_step, end = self._in_step, -1
         alone = closed and len(pieces) == 1 and pieces[0].start == 0 and self._unused
+        if alone:
+            cost, _ = self.expectation.weigh(pieces[0].frame, pieces[0].before)
+            alone = cost < SPOKEN_AGAINST
         for number, piece in enumerate(pieces):
             proved = (
                 in_step

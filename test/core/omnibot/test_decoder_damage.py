@@ -2,6 +2,7 @@
 
 """Tests of the decoder on damaged streams, on texts between frames, and after silences."""
 
+import math
 from random import Random
 
 import pytest
@@ -287,7 +288,7 @@ def test_flush_tells_the_only_frame_of_a_line(frame: Frame) -> None:
     """A line carries exactly one frame. ``flush`` returns it, because nothing speaks against it.
 
     If a byte is missing or added, or if the decoder has discarded bytes before, the frame is not
-    returned.
+    returned. An impossible frame is not returned either.
     """
     data = encode(frame)
     for pieces in ([data], [data[index : index + 1] for index in range(len(data))]):
@@ -303,6 +304,9 @@ def test_flush_tells_the_only_frame_of_a_line(frame: Frame) -> None:
     after.feed(b"\x41\x42", 0.0)
     assert after.flush(0.0) == []
     assert after.feed(data, 0.0) + after.flush(0.0) == []
+    impossible = FrameDecoder()
+    far = encode(PoseFrame(math.nan, 1e30, 0.0, 5))
+    assert impossible.feed(far, 0.0) + impossible.flush(0.0) == []
 
 
 def test_a_decoder_goes_on_after_a_flush() -> None:
