@@ -220,23 +220,19 @@ PERIODS: Final[Mapping[str, Stream]] = {
 
 
 def _period(
-    name: str,
-    what: str,
-    default_s: float = 0.0,
-    low_s: float = 0.0,
-    high_s: float = LONGEST_PERIOD_S,
+    name: str, what: str, low_s: float = 0.0, high_s: float = LONGEST_PERIOD_S
 ) -> Parameter:
-    note = "" if default_s else " If it is not set, the board keeps its own value."
     off = "" if low_s else "; 0 turns it off"
     return Parameter(
         name,
-        default_s,
+        low_s,
         "s",
         f"Period of the {what}{off}. The board cannot receive while it sends, so"
-        f" with a shorter period it misses more commands.{note}",
+        " with a shorter period it misses more commands. If it is not set, the board keeps its own"
+        " value.",
         low=low_s,
         high=high_s,
-        unset=not default_s,
+        unset=True,
     )
 
 
@@ -245,11 +241,10 @@ SENT: Final = (
         "ticks_period",
         "message with the ticks (0x12). Without the ticks the driver has no odometry and cannot"
         " confirm a stop",
-        0.2,
         SHORTEST_PERIOD_S,
         0.5,
     ),
-    _period("odometry_period", "message with the board's own odometry (0x20)", 0.2),
+    _period("odometry_period", "message with the board's own odometry (0x20)"),
     _period("heading_period", "heading (0x10)"),
     _period("position_period", "GPS position (0x0d)"),
     _period("time_period", "GPS time (0x0e)"),

@@ -43,7 +43,7 @@ RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
-It is long enough for stopped wheels to come to rest, and for four tick reports to arrive.
+It is long enough for stopped wheels to come to rest, and for two tick reports to arrive.
 
 After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. But small counts
 that stay the same, although a reset would set them to zero, show that the board has not obeyed.
@@ -52,7 +52,7 @@ gives the reset up before ``UNPROVED_S`` has passed.
 """
 STEADY_S: Final = 0.3
 """Time in s. If the tick counts do not change for this time, the wheels are regarded as at rest.
-The time is longer than the usual period of the tick reports."""
+With the period that the board has after a boot, 0.4 s, one unchanged report is enough."""
 
 
 class LoisEcuBoard(Board):

@@ -205,11 +205,16 @@ class LoisConversation:
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters and rates for diagnostics. The counters continue after a reconnection."""
-        ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
+        """Counters and rates for diagnostics. The counters continue after a reconnection.
+
+        If the user has set no period of the ticks, the measured period gives the expected rate.
+        """
+        ticks_ms = self._settings.periods_ms.get(
+            Stream.TICKS, 1e3 * self._upkeep.writer.ticks_period_s
+        )
         gains = own_gains(self._settings)
         return BoardFigures(
-            rates_hz={"Odometry": 1e3 / ticks_ms} if ticks_ms < PERIOD_ONCE else {},
+            rates_hz={"Odometry": round(1e3 / ticks_ms, 1)} if 0 < ticks_ms < PERIOD_ONCE else {},
             faults=self._statistics.faults + self._decoder.group_statistics.damaged_groups,
             discarded_bytes=self._statistics.discarded_bytes,
             saturated=self._points.saturated,

@@ -21,7 +21,7 @@ from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.misconfiguration import own_gains
 from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.plausibility import wrapped
-from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.settings import BOOT_PERIOD_MS, LoisEcuSettings
 from omnibot_driver.core.lois_ecu.wheel_model import CommandKind
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
 
@@ -79,7 +79,7 @@ class LoisOdometry:
         """Use the new ``settings`` from the next report on."""
         motion, yaw_rad = self._motion, self._motion.yaw_rad
         self._settings = settings
-        period_s = settings.periods_ms.get(Stream.TICKS, 0) / 1e3
+        period_s = settings.periods_ms.get(Stream.TICKS, BOOT_PERIOD_MS) / 1e3
         self._unheard_s = max(UNHEARD_S, UNHEARD_GROUPS * period_s)
         other_wheels = motion.tick_m != settings.tick_m
         motion.tick_m, motion.rpm_mps = settings.tick_m, settings.rim_mps_per_rpm

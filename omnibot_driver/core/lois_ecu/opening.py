@@ -186,6 +186,13 @@ class SettingsWriter:
         self._dates_asked += 1
         self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
+    @property
+    def ticks_period_s(self) -> float:
+        """Measured period of the tick reports in s. It is infinity until four of them have come."""
+        if len(self._arrivals) < 4:
+            return math.inf
+        return median(after - before for before, after in pairwise(self._arrivals))
+
     def ticks_came(self, now: float) -> None:
         """Record the arrival of ticks, and check whether they come with the period in the settings.
 
@@ -194,11 +201,11 @@ class SettingsWriter:
         """
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
-        if len(self._arrivals) < 4:
+        period_s = self.ticks_period_s
+        if period_s == math.inf:
             return
-        steps = [after - before for before, after in pairwise(self._arrivals)]
-        wanted_s = median(steps) if wanted is None else wanted / 1000
-        self._in_period = abs(median(steps) - wanted_s) <= CONFIRMED_WITHIN * wanted_s
+        wanted_s = period_s if wanted is None else wanted / 1000
+        self._in_period = abs(period_s - wanted_s) <= CONFIRMED_WITHIN * wanted_s
         tried = self._rounds - self._repeated
         if not self.confirmed and self.done and tried < MOST_ROUNDS:
             away_s = AWAY_S[self._rounds % len(AWAY_S)]

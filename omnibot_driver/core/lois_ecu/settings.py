@@ -7,18 +7,15 @@ The user must give them, because the board does not report them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Final, Literal
 
 from omnibot_driver.core.lois_ecu.messages import Setting, Stream, TerminalMode
 
 DriveMode = Literal["rpm", "duty"]
 
-USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
-    {Stream.TICKS: 200, Stream.ODOMETRY: 200}
-)
-"""Periods in ms of the reports that the odometry needs. Shorter periods are harmful, because the
-board cannot receive while it sends."""
+BOOT_PERIOD_MS: Final = 400
+"""Period in ms with which the board sends ticks after a boot. The driver assumes this period if the
+user does not set one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +34,8 @@ class LoisEcuSettings:
 
     ``written``: further settings that the user wants on the board.
 
-    ``periods_ms``: periods of the board's messages. Periods that are not listed stay unchanged.
+    ``periods_ms``: periods of the board's messages that the user wants. The driver writes no other
+    period.
 
     ``declination_rad``: angle from true to magnetic north, east positive.
     """
@@ -51,7 +49,7 @@ class LoisEcuSettings:
     duty_scale: float = 130.0
     low_pass: float = 1.0
     written: Mapping[Setting, float] = field(default_factory=dict)
-    periods_ms: Mapping[Stream, int] = field(default_factory=lambda: USUAL_PERIODS_MS)
+    periods_ms: Mapping[Stream, int] = field(default_factory=dict)
     with_sum: bool = True
     terminal_mode: TerminalMode = TerminalMode.HOST
     declination_rad: float = 0.0

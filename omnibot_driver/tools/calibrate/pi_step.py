@@ -46,8 +46,12 @@ The board does not acknowledge settings. The driver therefore sends each setting
 QUIET_S: Final = 0.5
 """Period, in s, with which the board sends its tick counts during a record.
 
-The period is long, because the board can miss encoder ticks while it sends.
+The period is long, because the board can miss encoder ticks while it sends. The tool does not set
+it if the user has set no period: it could not restore the board's own period, which is nearly as
+long.
 """
+OWN_PERIOD_S: Final = 0.4
+"""Period, in s, with which a board sends its tick counts after a boot."""
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
 UNRESTORED: Final = (
@@ -154,9 +158,10 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         1.0 / arguments.control_frequency,
         ticks,
         LEAST_DEAD_S,
-        sends_each_s=bench.robot.parameters["ticks_period"],
+        sends_each_s=bench.robot.parameters["ticks_period"] or OWN_PERIOD_S,
     )
-    bench.set({"drive_mode": "rpm", "record_samples": arguments.samples, "ticks_period": QUIET_S})
+    quiet = {"ticks_period": QUIET_S} if bench.robot.parameters["ticks_period"] else {}
+    bench.set({"drive_mode": "rpm", "record_samples": arguments.samples, **quiet})
     was = bench.steps([FIRST_RPM] * 2)
     corrections = _encoders(bench)
     starts = bench.record("duty_cmd", [FULL_PERCENT] * 2, arguments.records)

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from any_board import AnyBench, LoisRobot
+from lois_drives import with_usual_periods
 
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
@@ -29,13 +30,22 @@ class Bench(AnyBench):
     """A session with a simulated LOIS ECU. A new bench has been in state nominal for 1.5 s.
 
     ``steps``: encoder ticks of one turn of a wheel.
+
+    ``own_periods``: whether the board keeps its own periods, if ``settings`` has none.
     """
 
     def __init__(
-        self, firmware: str, settings: LoisEcuSettings | None = None, *, steps: int = 60
+        self,
+        firmware: str,
+        settings: LoisEcuSettings | None = None,
+        *,
+        steps: int = 60,
+        own_periods: bool = False,
     ) -> None:
         self.lois = LoisRobot(firmware, steps)
-        super().__init__(LoisEcuBoard(settings or LoisEcuSettings()), self.lois)
+        ours = settings or LoisEcuSettings()
+        board = LoisEcuBoard(ours if own_periods else with_usual_periods(ours))
+        super().__init__(board, self.lois)
         self.open()
         self.run_until(lambda: self.session.state == "nominal")
         self.run(1.5)
@@ -77,7 +87,7 @@ def told(bench: Bench, kind: type) -> list[Any]:
 
 def configure(bench: Bench, settings: LoisEcuSettings) -> None:
     """Change the session's board settings, as the node does when parameters change."""
-    bench.session.configure(SETTINGS, bench.now, board=settings)
+    bench.session.configure(SETTINGS, bench.now, board=with_usual_periods(settings))
     bench.settle()
 
 

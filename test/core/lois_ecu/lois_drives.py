@@ -3,13 +3,13 @@
 """Drives of a simulated LOIS robot, with its odometry and its true pose, in simulated time."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from random import Random
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.lois_ecu import Setting
+from omnibot_driver.core.lois_ecu import Setting, Stream
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
@@ -17,6 +17,9 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, SimulatedLois
 
 STOP = (0.0, 0.0)
+USUAL_PERIODS_MS = {Stream.TICKS: 200, Stream.ODOMETRY: 200}
+"""Periods of the reports in ms that the benches set, as docs/boards/lois_ecu.md recommends. If a
+user sets no periods, the board keeps its own, 400 ms. ``test_lois_own_periods.py`` tests these."""
 HOST_GAINS = LoisEcuSettings(
     low_pass=0.1,
     written={
@@ -77,6 +80,11 @@ VARIED = (
 
 The seed of a motion sets its speed. It also sets the curvature of a curve, or the angle of a turn.
 """
+
+
+def with_usual_periods(settings: LoisEcuSettings) -> LoisEcuSettings:
+    """Return the settings, with ``USUAL_PERIODS_MS`` if they have no periods."""
+    return replace(settings, periods_ms=settings.periods_ms or USUAL_PERIODS_MS)
 
 
 def varied(name: str, seed: int) -> Program:
@@ -183,6 +191,8 @@ class Rig:
     ``loss``: probability that a byte is lost.
 
     ``reads_s``: least and greatest time between two reads of the driver, in s.
+
+    ``own_periods``: whether the board keeps its own periods, if ``ours`` has none.
     """
 
     def __init__(
@@ -190,13 +200,15 @@ class Rig:
         settings: LoisSettings,
         ours: LoisEcuSettings | None = None,
         *,
+        own_periods: bool = False,
         loss: float = 0.0,
         reads_s: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self._loss, self._random = loss, Random(f"line {settings.seed}")
         self._reads_s, self._unread, self._read_at_s = reads_s, b"", 0.0
         self.board = SimulatedLois(settings)
-        self.driver = LoisConversation(HOST_GAINS if ours is None else ours)
+        ours = HOST_GAINS if ours is None else ours
+        self.driver = LoisConversation(ours if own_periods else with_usual_periods(ours))
         self.estimates: list[tuple[FusedOdometry, Pose]] = []
         self.readings: list[LoisReading] = []
         self.way_m = self.turned_rad = 0.0
@@ -298,13 +310,15 @@ def motion(
     side_m: float = 5.0,
     loss: float = 0.0,
     reads_s: tuple[float, float] = (0.0, 0.0),
+    own_periods: bool = False,
 ) -> Drive:
     """Drive one of the motions ``MOTIONS`` or ``VARIED``, and return the outcome.
 
     The encoders begin at random positions between two ticks. ``loss``: probability that a byte is
     lost. ``reads_s``: least and greatest time between two reads of the driver, in s.
+    ``own_periods``: whether the board keeps its own periods.
     """
-    rig = Rig(settings, ours, loss=loss, reads_s=reads_s)
+    rig = Rig(settings, ours, loss=loss, reads_s=reads_s, own_periods=own_periods)
     random = Random(f"encoders {settings.seed}")
     for encoder in rig.board._vehicle.encoders:
         encoder._periods = random.random()

@@ -5,7 +5,7 @@
 import math
 
 import pytest
-from lois_drives import HOST_GAINS, Rig, nominal
+from lois_drives import HOST_GAINS, USUAL_PERIODS_MS, Rig, nominal
 
 from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks, comparison
 from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
@@ -24,7 +24,7 @@ class Told:
     """
 
     def __init__(self, rpm: tuple[int, int]) -> None:
-        self.odometry = LoisOdometry(LoisEcuSettings())
+        self.odometry = LoisOdometry(LoisEcuSettings(periods_ms=USUAL_PERIODS_MS))
         self._command, self._now = SetRpm(*rpm), 0.0
         self._x_m = self._y_m = self._yaw_rad = 0.0
         for _ in range(3):
@@ -58,7 +58,7 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
     The driver predicts the motion for 0.6 s only. Afterwards the variances of the twist include a
     standstill: a board that restarts has stopped.
     """
-    odometry, now = LoisOdometry(LoisEcuSettings()), 0.0
+    odometry, now = LoisOdometry(LoisEcuSettings(periods_ms=USUAL_PERIODS_MS)), 0.0
     for report in range(20):
         now += 0.2
         odometry.heard_ticks(Ticks(round(1e3 * now), 4 * report, 4 * report), now)

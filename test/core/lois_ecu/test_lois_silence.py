@@ -8,18 +8,16 @@ The board has no watchdog, so the wheels keep turning.
 import math
 
 import pytest
-from any_board import AnyBench, nominal
-
-FIRMWARES = ("lois_ecu", "lois_ecu as documented")
+from lois_bench import FIRMWARE, Bench
 
 
-def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
+def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> Bench:
     """Return a bench whose robot is at rest after a drive in which the connection was lost.
 
     ``seconds``: how long the connection was lost. ``reopened``: whether the port was closed and
     opened again.
     """
-    bench = nominal(firmware)
+    bench = Bench(firmware)
     bench.drive_on(vx, 4.0)
     bench.speaks = bench.hears = False
     if reopened:
@@ -34,9 +32,9 @@ def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> An
     return bench
 
 
-def off_by(bench: AnyBench) -> tuple[float, float]:
+def off_by(bench: Bench) -> tuple[float, float]:
     """Return the error of the estimated position and its standard deviation, both in m."""
-    estimate, truth = bench.odometry[-1], bench.robot.board.truth  # type: ignore[attr-defined]
+    estimate, truth = bench.odometry[-1], bench.board.truth
     error_m = math.hypot(estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m)
     return error_m, math.sqrt(estimate.covariance.xx + estimate.covariance.yy)
 
@@ -45,10 +43,10 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 @pytest.mark.parametrize(
     ("firmware", "vx", "seconds", "reopened"),
     [
-        ("lois_ecu", 0.3, 4.0, True),
-        ("lois_ecu", -0.3, 6.0, False),
-        ("lois_ecu as documented", 0.3, 6.0, False),
-        ("lois_ecu as documented", -0.3, 4.0, True),
+        ("firmware", 0.3, 4.0, True),
+        ("firmware", -0.3, 6.0, False),
+        ("documented", 0.3, 6.0, False),
+        ("documented", -0.3, 4.0, True),
     ],
 )
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
@@ -63,9 +61,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("firmware", "seconds"), [("lois_ecu", 3.0), ("lois_ecu as documented", 1.0)]
-)
+@pytest.mark.parametrize(("firmware", "seconds"), [("firmware", 3.0), ("documented", 1.0)])
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
@@ -80,13 +76,13 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("firmware", FIRMWARES)
+@FIRMWARE
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
     """The board is silent, and the robot drives on. The covariance grows meanwhile.
 
     So the error of the position stays within 3 sigma.
     """
-    bench = nominal(firmware)
+    bench = Bench(firmware)
     bench.drive_on(0.3, 4.0)
     bench.speaks = bench.hears = False
     before = bench.robot.way_m

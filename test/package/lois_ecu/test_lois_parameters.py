@@ -4,7 +4,8 @@
 
 import pytest
 
-from omnibot_driver.boards.lois_ecu import PARAMETERS
+from omnibot_driver.boards.lois_ecu import PARAMETERS, settings
+from omnibot_driver.boards.lois_ecu_parameters import PERIODS, SETTINGS
 from omnibot_driver.core.errors import ParameterError
 
 
@@ -25,3 +26,22 @@ def test_the_description_of_max_wheel_speed_names_every_topic_that_it_limits() -
     description = PARAMETERS.by_name["max_wheel_speed"].description
     assert "wheel_cmd" in description
     assert "duty_cmd" in description
+
+
+def test_what_the_board_keeps_is_unset_by_default() -> None:
+    """Settings and periods that the board keeps are unset by default, so nothing is written.
+
+    Bug: the driver wrote the periods of the ticks and of the odometry, 0.2 s, by default.
+    """
+    values = PARAMETERS.check_all({})
+    assert {name: values[name] for name in (*PERIODS, *SETTINGS)} == dict.fromkeys(
+        (*PERIODS, *SETTINGS)
+    )
+    assert (settings(values).periods_ms, settings(values).written) == ({}, {})
+
+
+@pytest.mark.parametrize("period_s", [0.0, 0.01, 0.6])
+def test_ticks_are_neither_turned_off_nor_rare(period_s: float) -> None:
+    """Without ticks, nothing confirms a stop. So 0 is refused too: to unset the period, omit it."""
+    with pytest.raises(ParameterError, match=r"ticks_period' must be 0\.05 to 0\.5 s"):
+        PARAMETERS.check_all({"ticks_period": period_s})

@@ -53,12 +53,12 @@ def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board
 
     The driver replaces the board's own controller gains, with which the robot would swerve.
 
-    Then the board restarts. The driver writes its gains again, and the robot obeys new commands.
-    The pose in odom continues from its value before the restart. At the end, the error of the pose
-    is at most 8 cm, or at most 3 sigma if this is more.
+    Then the board restarts. The driver writes its gains and the period of the ticks again, and the
+    robot obeys new commands. The pose in odom continues from its value before the restart. At the
+    end, the error of the pose is at most 8 cm, or at most 3 sigma if this is more.
     """
     ecu = ecu_of(firmware, stack)
-    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
+    probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", ticks_period=0.2, **GAINS))
     probe.wait_for_state("nominal")
     ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))
     odometry = probe.listen(Odometry, "odom")
@@ -152,7 +152,8 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """A user calls ``~/reset`` after a drive.
 
-    The board's tick counts become 0, but the pose in odom continues.
+    The board's tick counts become 0, but the pose in odom continues. When the wheels start, a
+    report may correct the pose by 0.15 m, because the board keeps its own period of 400 ms.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)
@@ -171,7 +172,7 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     with driven(probe, ecu):
         probe.wait_for(lambda: way_m() > before_m + 0.1)
     assert all(
-        math.hypot(b.x - a.x, b.y - a.y) < 0.1
+        math.hypot(b.x - a.x, b.y - a.y) < 0.25
         for a, b in pairwise(message.pose.pose.position for message in odometry)
     )
 
@@ -179,7 +180,7 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
     """A user sets a gain. The driver writes it to the board, and again after a restart.
 
-    Unset gains are not written.
+    Unset gains and periods are not written.
     """
     ecu.do(lambda board: board.commands.clear())
     set_parameter(probe, "left_kp", 0.5)
@@ -187,7 +188,7 @@ def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, pr
     ecu.do(lambda board: board.reboot())
     ecu.wait_for(lambda board: board.wheels[0].controller.gains.kp == pytest.approx(0.5))
     written = {obeyed.command for obeyed in ecu.do(lambda board: list(board.commands))}
-    assert written <= {0x01, 0x02, 0x06, 0x0F, 0x11, 0x12, 0x13, 0x20, 0x23}
+    assert written <= {0x01, 0x02, 0x06, 0x0F, 0x11, 0x13, 0x23}
 
 
 @pytest.mark.parametrize("firmware", QUIRKS)

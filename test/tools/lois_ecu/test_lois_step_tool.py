@@ -29,7 +29,8 @@ def test_a_robot_is_calibrated_from_its_records(
     """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
 
     ``calibrate step`` finds the constants of both wheels, and sets corrections and gains in the
-    driver. All of these values are allowed in the calibration file.
+    driver. All of these values are allowed in the calibration file. The user has set no period, so
+    the board keeps its own.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
@@ -53,6 +54,7 @@ def test_a_robot_is_calibrated_from_its_records(
     assert {name: robot.parameters[name] for name in result.parameters} == result.parameters
     assert robot.parameters["drive_mode"] == "rpm"
     robot.rest(3.0)
+    assert robot.board._timers[0x12].period_ms == 400
     gains = robot.board.wheels[1].controller.gains
     assert gains.kp == pytest.approx(result.parameters["right_kp"])
     assert gains.td == pytest.approx(result.parameters["right_td"])
@@ -101,6 +103,7 @@ def test_an_interrupted_measurement_restores_the_parameters(
     The tool then sets the driver's parameters to the values that they had before the measurement.
     """
     robot = SimulatedRobot(tmp_path, random_motors(5))
+    robot.set_parameters({"ticks_period": 0.2})
     before = dict(robot.parameters)
     during: list[dict[str, object]] = []
 
@@ -114,5 +117,5 @@ def test_an_interrupted_measurement_restores_the_parameters(
     words = ["step", "--yes", "--records", "1", "--responses", "1", "--samples", "100"]
     with pytest.raises(Interrupted):
         step.run(robot, Console(yes=True), command_line().parse_args(words))
-    assert during[0] != before
+    assert during[0]["ticks_period"] == pi_step.QUIET_S
     assert robot.parameters == before
