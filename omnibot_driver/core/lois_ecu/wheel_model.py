@@ -77,8 +77,11 @@ class WheelModel:
 
     @property
     def unmeasured(self) -> bool:
-        """Whether a duty drives this wheel, but the public firmware does not measure its speed."""
-        return self.kind == "duty" and bool(self.target_mps) and not self.measured_sign
+        """Whether a duty is set, and the public firmware does not measure this wheel's speed.
+
+        A stop is a duty too: the wheel rolls out, and the firmware does not measure that either.
+        """
+        return self.kind == "duty" and not self.measured_sign
 
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
         """Record that a command was written at ``at_s``."""

@@ -40,6 +40,23 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
     assert one.sigmas < 3.0
 
 
+@pytest.mark.parametrize("own_periods", [False, True])
+def test_a_report_just_after_a_stop_does_not_take_the_drive_back(*, own_periods: bool) -> None:
+    """The robot stops after a drive by duty. A report arrives while the wheels still roll out.
+
+    The public firmware has measured nothing of the drive. Its report does not show that the robot
+    was at rest during the drive.
+
+    Bug: half of the distance disappeared from the odometry.
+    """
+    ours = LoisEcuSettings(drive_mode="duty")
+    for step in range(10):  # the report comes at another time after each stop
+        rig = Rig(nominal("firmware", step), ours, own_periods=own_periods)
+        one = rig.drive([(3.0 + 0.05 * step, PUSH)])
+        assert off_m(one) < 0.1 * one.way_m
+        assert one.sigmas < 1.0
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_duty_of_the_other_sign_brakes_the_wheels(seed: int) -> None:
     """The duty changes from backward to forward. The motors are slower than the driver assumes.
