@@ -205,28 +205,27 @@ class Comparison:
             if moved or max(map(abs, shown)) < CREEPING_RPM * motion.rpm_mps:
                 self._no_tick(duration_s, 1.0 if moved else 2.0)
                 return
+        speeds_mps = () if self._equal(told, shown) else told.speeds_mps or ()
+        for wheel_speed, speed_mps in zip(self._speeds, speeds_mps, strict=False):
+            wheel_speed.judge(speed_mps, duration_s)
         rolling = abs(motion.speed_mps(0)) + abs(motion.speed_mps(1))
         pause_s = min(motion.tick_m / max(rolling, 0.01), LONGEST_PAUSE_S)
         self._turned_m += told.turned_m
         before_m = motion.way_m(0), motion.way_m(1)
-        self._turn(told, shown[1] - shown[0], pause_s, duration_s, late_s)
-        self._along(told, sum(shown) / 2, pause_s)
+        if speeds_mps and any(wheel_speed.misleads for wheel_speed in self._speeds):
+            self.begin_odometry()
+        else:
+            self._turn(told, shown[1] - shown[0], pause_s, duration_s, late_s)
+            self._along(told, sum(shown) / 2, pause_s)
         for index, wheel in enumerate(motion.wheels):
             corrected_m = abs(motion.way_m(index) - before_m[index])
             large_m = corrected_m - CORRECTED_TICKS * motion.tick_m
             if wheel.blind and large_m > 0.0:
                 motion.shift(index, 0.0, CORRECTED_PART * large_m)
-        if told.speeds_mps is None:
-            return
-        left, right = (wheel.course.measured_sign for wheel in motion.wheels)
-        differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * motion.rpm_mps
-        # The board keeps reporting the last speed of a wheel at rest. So speeds are compared only
-        # after a tick.
-        if any(told.speeds_mps) or left * right <= 0 or (differ and told.still):
-            for wheel_speed, speed_mps in zip(self._speeds, told.speeds_mps, strict=True):
-                wheel_speed.take(speed_mps, duration_s)
-        else:
-            self._equal(duration_s)
+        for wheel_speed, speed_mps in zip(self._speeds, speeds_mps, strict=False):
+            wheel_speed.take(speed_mps, duration_s)
+        if told.speeds_mps and not speeds_mps:
+            self._take_equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
         """Record that a wheel has come to rest, and remove the distance added since that time.
@@ -235,7 +234,19 @@ class Comparison:
         """
         self._speeds[index].come_to_rest()
 
-    def _equal(self, duration_s: float) -> None:
+    def _equal(self, told: Told, shown: tuple[float, float]) -> bool:
+        """Return whether both wheels have the same speed, so that the board does not report it.
+
+        ``shown``: for each wheel, the estimate of the speed that the board measured last, in m/s.
+        """
+        left, right = (wheel.course.measured_sign for wheel in self._motion.wheels)
+        differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * self._motion.rpm_mps
+        # The board keeps reporting the last speed of a wheel at rest. So speeds are compared only
+        # after a tick.
+        unknown = told.speeds_mps is not None and not any(told.speeds_mps)
+        return unknown and left * right > 0 and not (differ and told.still)
+
+    def _take_equal(self, duration_s: float) -> None:
         """Correct the motion filter: both wheels have the same speed.
 
         The board does not report the value of this speed.

@@ -35,6 +35,10 @@ JUMP_RPM_PER_S: Final = 200.0
 """``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, from one reported
 speed to the next. A larger change is not real: the board has noticed a tick late, and therefore
 measured a wrong speed."""
+FIRST_RPM: Final = 8.0
+FIRST_PART: Final = 2.0
+"""``FIRST_RPM + FIRST_PART * expected``: largest plausible first speed, in RPM, of a wheel that
+starts."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported
@@ -64,7 +68,12 @@ class ReportedSpeed:
         self._wheel = motion.wheels[index]
         self._told = 0.0
         self._repeats = 0
-        self._jumped = False
+        self._rejected_mps: float | None = None
+        """The last reported speed, if it was rejected as implausible."""
+        self._false = False
+        """Whether the board holds a speed that the wheel never had."""
+        self.misleads = False
+        """Whether the board's last heading contains such a speed."""
         self._doubted_m = 0.0
         """Standard deviation in m that the driver has added to the wheel's distance, because the
         wheel may be at rest. It is 0 again after each change of the wheel's reported speed."""
@@ -99,6 +108,26 @@ class ReportedSpeed:
         motion.filter.forget(wheel.base + SPEED, 0.0, 0.0)
         motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
+    def judge(self, speed_mps: float, duration_s: float) -> None:
+        """Decide whether a reported speed is plausible. Call this before ``take``.
+
+        An implausible speed is rejected once, because the next one is another measurement. But
+        while the board reports the same implausible speed, the wheel has not ticked again.
+        """
+        motion, before_mps, misled = self._motion, self._rejected_mps, self._false
+        self._rejected_mps, self._false, self.misleads = None, False, misled
+        sign = self._wheel.course.measured_sign
+        if not sign or speed_mps * sign < 0:
+            return
+        repeated = before_mps is not None and abs(speed_mps - before_mps) < 0.1 * motion.rpm_mps
+        if before_mps is not None and not repeated:
+            return
+        rpm = abs(speed_mps) / motion.rpm_mps
+        if self._jumps(rpm, duration_s) or self._starts_too_fast(rpm):
+            self._rejected_mps = speed_mps
+            self._false = repeated or not self._told
+            self.misleads = misled or self._false
+
     def take(self, speed_mps: float, duration_s: float) -> None:
         """Correct the wheel's estimate by the speed that the board reports.
 
@@ -112,9 +141,9 @@ class ReportedSpeed:
         if not sign or speed_mps * sign < 0:
             self._told = speed_mps
             return
-        jumps = self._jumps(abs(speed_mps) / rpm_mps, duration_s)
-        self._jumped = jumps and not self._jumped
-        if self._jumped:
+        if self._rejected_mps is not None:
+            shown = abs(speed_mps) + motion.rounded_mps(self._index)
+            estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
             return
         before, self._told = self._told, speed_mps
         repeated = abs(speed_mps - before) < 0.1 * rpm_mps
@@ -152,6 +181,18 @@ class ReportedSpeed:
         )
         strays = abs(told_rpm - expected_rpm) > STRAY_RPM + STRAY_PART * expected_rpm + unsure_rpm
         return motion.tuned and wheel.steady and strays
+
+    def _starts_too_fast(self, told_rpm: float) -> bool:
+        """Return whether the first speed of a wheel that starts is implausible.
+
+        The board computes this speed from the time since the wheel's last tick, long ago, and its
+        timer wraps every 6.6 s. So the speed may have any value.
+        """
+        motion, wheel = self._motion, self._wheel
+        if self._told or wheel.rolls_on or wheel.course.kind != "rpm":
+            return False
+        expected_rpm = abs(motion.speed_mps(self._index)) / motion.rpm_mps
+        return told_rpm > FIRST_RPM + FIRST_PART * expected_rpm
 
     def _rest(self, told_mps: float, duration_s: float, *, repeated: bool) -> None:
         """Decide whether this wheel has come to rest, or rolls again."""

@@ -1,0 +1,86 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Reported speeds that a wheel does not have, and the heading that the board computes from them."""
+
+import math
+
+import pytest
+
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+UNIT_MPS = 0.13 * math.tau / 60
+TRACK_M = 0.47
+PERIOD_S = 0.15
+
+
+class Reports:
+    """The odometry of a robot with the public firmware. Each test invents the reports."""
+
+    def __init__(self) -> None:
+        self.odometry = LoisOdometry(LoisEcuSettings())
+        self._now = self._yaw_rad = self._x_m = 0.0
+        self._ticks = [0, 0]
+        self._last = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
+        self.report((0, 0))
+        self.report((0, 0))
+
+    def order(self, left_rpm: int, right_rpm: int) -> None:
+        self.odometry.wrote(SetRpm(left_rpm, right_rpm), self._now + 0.02)
+
+    def report(
+        self,
+        rpm: tuple[int, int],
+        ticks: tuple[int, int] = (0, 0),
+        *,
+        still: bool = False,
+        passed_s: float = PERIOD_S,
+    ) -> None:
+        """Pass a report to the odometry.
+
+        * ``rpm``: the speeds in RPM that the board reports for the left and the right wheel.
+        * ``ticks``: newly counted ticks.
+        * ``still``: whether no wheel has ticked, so that the board's pose is the same.
+        * ``passed_s``: for how long the board has moved its pose with these speeds.
+        """
+        self._now += PERIOD_S
+        left, right = (one * UNIT_MPS for one in rpm)
+        along, turning = (left + right) / 2, (right - left) / TRACK_M
+        if not still:
+            self._yaw_rad += passed_s * turning
+            self._x_m += passed_s * along * math.cos(self._yaw_rad)
+            dx, dy = along * math.cos(self._yaw_rad), along * math.sin(self._yaw_rad)
+            self._last = BoardOdometry(
+                self._x_m, 0.0, self._yaw_rad, dx, dy, turning, appended=True
+            )
+        self._ticks = [old + new for old, new in zip(self._ticks, ticks, strict=True)]
+        self.odometry.heard_ticks(Ticks(round(1e3 * self._now), *self._ticks), self._now)
+        self.odometry.heard_odometry(self._last, self._now + 0.01)
+
+    @property
+    def ways_m(self) -> tuple[float, float]:
+        """Estimated distances of the left and the right wheel in m."""
+        self.odometry.predict(self._now + 0.02)
+        return self.odometry._motion.way_m(0), self.odometry._motion.way_m(1)
+
+
+@pytest.mark.parametrize("false_rpm", [-16, -54, -108])
+def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
+    false_rpm: int,
+) -> None:
+    """The left wheel starts backward. Its first reported speed is far too high.
+
+    The board measures a speed from one tick to the next, and its timer wraps while a wheel is at
+    rest. It also computes its heading with this speed until the wheel ticks again. The wheel has
+    rolled a few cm, and the estimate does not show more.
+    """
+    reports = Reports()
+    reports.order(-12, 12)
+    reports.report((0, 0), still=True)
+    reports.report((0, 0), still=True)
+    for right_rpm in (9, 13, 16):
+        reports.report((false_rpm, right_rpm), (0, 2))
+    reports.report((-4, 16), (0, 2))
+    left_m, _ = reports.ways_m
+    assert -0.06 < left_m <= 0.0
