@@ -99,6 +99,8 @@ class Comparison:
         self._counted = [False, False]
         """For each wheel: whether the board was counting its ticks when the last report arrived."""
         self._turned_m = 0.0
+        self._still_s = 0.0
+        """How long the board's odometry (0x20) has shown no tick, in s."""
         self._speeds = ReportedSpeed(motion, 0), ReportedSpeed(motion, 1)
 
     # Ticks
@@ -205,6 +207,7 @@ class Comparison:
             if moved or max(map(abs, shown)) < CREEPING_RPM * motion.rpm_mps:
                 self._no_tick(duration_s, 1.0 if moved else 2.0)
                 return
+        self._still_s = 0.0
         speeds_mps = () if self._equal(told, shown) else told.speeds_mps or ()
         for wheel_speed, speed_mps in zip(self._speeds, speeds_mps, strict=False):
             wheel_speed.judge(speed_mps, duration_s)
@@ -268,6 +271,11 @@ class Comparison:
         """
         motion = self._motion
         self.begin_odometry()
+        self._still_s += duration_s
+        left_mps, right_mps = motion.shown_mps(0), motion.shown_mps(1)
+        # With the next tick of either wheel, the board computes one turn for the whole pause.
+        motion.filter.mean[TURN] = (right_mps - left_mps) * self._still_s
+        motion.filter.mean[ALONG] = (right_mps + left_mps) / 2 * self._still_s
         variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2
         for index, wheel in enumerate(motion.wheels):
             speed = [(wheel.base + SPEED, 1.0)]

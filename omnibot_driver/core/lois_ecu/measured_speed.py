@@ -64,7 +64,7 @@ def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, floa
             step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))
         # At each tick of either wheel, 0x20 uses the last measured speeds of both. So while one
         # wheel rests, its old speed is used.
-        fresh = speed / (abs(before[0]) + abs(before[1]))
+        fresh = speed / max(abs(before[0]) + abs(before[1]), STANDS_MPS)
         shown = fresh * speed + (1 - fresh) * new[base + HELD] - motion.rounded_mps(index)
         if shown > 0.0:
             told[index] = sign * shown

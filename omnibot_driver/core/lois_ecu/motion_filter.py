@@ -319,7 +319,7 @@ class MotionFilter:
         before = (self.speed_mps(0), self.speed_mps(1))
         for wheel in self.wheels:
             wheel.roll(step, self._target(wheel), holds=self.holds, signed=self.signed)
-        if abs(before[0]) + abs(before[1]) > ROLLING_MPS:
+        if abs(before[0]) + abs(before[1]) > ROLLING_MPS or any(map(self.shown_mps, (0, 1))):
             measure_speeds(self, step, before)
         self._move(step)
         self.filter.propagate(step.rows)

@@ -84,3 +84,24 @@ def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
     reports.report((-4, 16), (0, 2))
     left_m, _ = reports.ways_m
     assert -0.06 < left_m <= 0.0
+
+
+def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
+    """The left wheel is at rest, but the board still holds 11 RPM for it. The right wheel starts.
+
+    With the first tick of the right wheel, the board computes one turn for the whole pause before
+    this tick, as if the left wheel had rolled at 11 RPM. The left wheel gets none of this turn.
+    """
+    reports = Reports()
+    reports.order(-12, 12)
+    for rpm in ((0, 0), (0, 0), (0, 3), (-5, 9), (-9, 11), (-11, 12), (-12, 12), (-11, 12)):
+        reports.report(rpm, (0, round(rpm[1] * PERIOD_S)), still=not any(rpm))
+    reports.order(0, 0)
+    reports.order(-16, 12)
+    reports.report((0, 0))
+    reports.report((-11, 0))
+    for _ in range(2):
+        reports.report((-11, 0), still=True)
+    before_m, _ = reports.ways_m
+    reports.report((-11, 0), (0, 1), passed_s=3 * PERIOD_S)
+    assert reports.ways_m[0] == pytest.approx(before_m, abs=0.02)
