@@ -65,6 +65,9 @@ The *excess* is the fraction by which a wheel that rolls backward is faster than
 Each of these constants has two values: for the board's own controller gains, and for the user's.
 """
 DUTY_STDDEV: Final = 0.3
+ROLLS_S: Final = 0.1
+"""Standard deviation of the distance that a wheel rolls after an RPM set-point has taken its power
+away, in m for each m/s of its speed. The motors and their friction are unknown."""
 REVERSES_S: Final = 0.2
 """Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign.
 
@@ -268,6 +271,8 @@ class MotionFilter:
                 variance = (EXCESS_CHANGE[self.tuned] * part) ** 2
                 self.filter.disturb([(EXCESS + index, 1.0)], variance)
             late_m = LATE_PART * wheel.course.step_s * speed
+            if cleared:
+                late_m = math.hypot(late_m, ROLLS_S * speed)
             if wheel.course.kind == "duty" and wheel.course.target_mps * speed < 0:
                 late_m = math.hypot(late_m, REVERSES_S * speed)
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)

@@ -165,7 +165,9 @@ class ReportedSpeed:
             wheel.rolls_on = ticked = False
         shown = abs(speed_mps) + (motion.rounded_mps(self._index) if speed_mps else 0.5 * rpm_mps)
         fast = shown > FASTER_RPM * rpm_mps and wheel.course.kind == "rpm"
-        if ticked and fast and not wheel.rolls_on:
+        if not repeated and fast and wheel.rolls_on and wheel.rolls_on_s:
+            self._rolls_at(math.copysign(shown, wheel.rolled_mps), duration_s)
+        elif ticked and fast and not wheel.rolls_on:
             self._rolls_at(math.copysign(shown, sign), duration_s)
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 

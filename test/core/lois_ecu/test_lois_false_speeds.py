@@ -105,3 +105,23 @@ def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
     before_m, _ = reports.ways_m
     reports.report((-11, 0), (0, 1), passed_s=3 * PERIOD_S)
     assert reports.ways_m[0] == pytest.approx(before_m, abs=0.02)
+
+
+def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
+    """The robot drives forward, and is commanded to drive backward. The wheels roll out.
+
+    The board reports the speeds of wheels that roll out with the sign of the new set-point. Wheels
+    with a higher reported speed have rolled farther forward.
+    """
+
+    def way_m(rpms: tuple[int, int]) -> float:
+        reports = Reports()
+        reports.order(20, 20)
+        for rpm in (0, 4, 12, 18, 20, 20, 20, 20, 20, 20):
+            reports.report((rpm, rpm), (round(rpm * PERIOD_S),) * 2, still=not rpm)
+        reports.order(-20, -20)
+        for rpm in rpms:
+            reports.report((-rpm, -rpm - 1))
+        return sum(reports.ways_m) / 2
+
+    assert way_m((19, 15)) > way_m((8, 5)) + 0.01
