@@ -107,6 +107,8 @@ class LateReads:
                 passed = ticks.time_counts
             if self._rates:
                 passed_s = TOWARDS_ARRIVAL * median(self._rates) * passed
+                if restarted and self._unit == "ms":
+                    passed_s = passed / 1e3  # the clock runs in real time while the board boots
                 waited = shown and (late or (self._waited and since_s < passed_s / 2))
                 if waited:
                     at_s = min(arrived_s, last.at_s + passed_s)

@@ -178,7 +178,8 @@ class MotionFilter:
         for index, wheel in enumerate(self.wheels):
             speed = self.speed_mps(index)
             rolled_s = 0.0 if self.signed else ROLLED_OUT_S
-            self.shift(index, speed * (powered_s + rolled_s), abs(speed) * ROLLED_OUT_S)
+            unsure_s = math.hypot(ROLLED_OUT_S, powered_s / 2)
+            self.shift(index, speed * (powered_s + rolled_s), abs(speed) * unsure_s)
             if not self.signed:
                 wheel.begin_again()
             wheel.rolled_to_m = self.way_m(index)

@@ -72,25 +72,28 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
     assert late.twist_covariance[1] >= (late.twist.vx_mps / TRACK_M) ** 2
 
 
-@pytest.mark.parametrize("gap_s", [0.7, 0.9])
+@pytest.mark.parametrize("gap_s", [0.6, 0.75])
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
     """The robot drives a curve backward, and no report arrives for a while.
 
     The set-points do not change, so the driver knows the motion. The standard deviation of the
-    heading grows by less than 10°, and the error of the heading is less than 10° too.
+    heading grows by less than 10°, and the error of the heading is less than 10° too. This is true
+    in each phase of the board's timers. The time between two reports is less than 1 s. If it were
+    longer, the board might have restarted.
     """
-    rig = Rig(nominal("firmware"), HOST_GAINS)
-    rig.run(4.0)
-    rig.order(-20, -24, 6.0)
-    before_deg = math.degrees(math.sqrt(rig.outcome().last.covariance.yaw_yaw))
-    rig._loss = 1.0
-    rig.order(-20, -24, gap_s)
-    rig._loss = 0.0
-    rig.order(-20, -24, 1.0)
-    one = rig.outcome()
-    assert math.degrees(math.sqrt(one.last.covariance.yaw_yaw)) < before_deg + 10.0
-    assert abs(one.error.yaw_rad) < math.radians(10.0)
-    assert one.sigmas < 3.0
+    for phase in range(8):
+        rig = Rig(nominal("firmware"), HOST_GAINS)
+        rig.run(4.0 + 0.025 * phase)
+        rig.order(-20, -24, 6.0)
+        before_deg = math.degrees(math.sqrt(rig.outcome().last.covariance.yaw_yaw))
+        rig._loss = 1.0
+        rig.order(-20, -24, gap_s)
+        rig._loss = 0.0
+        rig.order(-20, -24, 1.0)
+        one = rig.outcome()
+        assert math.degrees(math.sqrt(one.last.covariance.yaw_yaw)) < before_deg + 10.0
+        assert abs(one.error.yaw_rad) < math.radians(10.0)
+        assert one.sigmas < 3.0
 
 
 def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
