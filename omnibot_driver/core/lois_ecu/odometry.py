@@ -346,7 +346,13 @@ class LoisOdometry:
 
     @property
     def _blind(self) -> bool:
-        return not self._motion.signed and any(wheel.blind for wheel in self._motion.wheels)
+        """Whether the ticks alone do not show the motion of both wheels.
+
+        The board counts the ticks of a wheel that rolls out backward as if it rolled forward.
+        """
+        return not self._motion.signed and any(
+            wheel.blind or (wheel.rolls_on and wheel.rolls_on_s) for wheel in self._motion.wheels
+        )
 
     def _estimate(self) -> FusedOdometry:
         self._estimated = True

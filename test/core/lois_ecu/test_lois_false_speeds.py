@@ -125,3 +125,20 @@ def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
         return sum(reports.ways_m) / 2
 
     assert way_m((19, 15)) > way_m((8, 5)) + 0.01
+
+
+def test_wheels_that_roll_out_backward_do_not_move_forward_by_their_ticks() -> None:
+    """The robot drives backward, and is commanded to drive forward. The wheels roll out for long.
+
+    The board counts ticks again, but upward. Its speeds show that the wheels still roll. So the
+    filter takes the ticks for motion backward.
+    """
+    reports = Reports()
+    reports.order(-20, -20)
+    for rpm in (0, 4, 12, 18, 20, 20, 21, 20, 21, 20):
+        reports.report((-rpm, -rpm - 1), still=not rpm)
+    before_m = sum(reports.ways_m) / 2
+    reports.order(20, 20)
+    for rpm in (18, 15, 11):
+        reports.report((rpm, rpm + 1), (round(rpm * PERIOD_S),) * 2)
+    assert sum(reports.ways_m) / 2 < before_m - 0.08
