@@ -192,11 +192,11 @@ class LoisEcuBoard(Board):
         return readings + self._shown_reset()
 
     def _shown_reset(self) -> list[Reading]:
-        proof, known = self._reset_proof, self._ecu.translation
-        if proof is None or known.ticks is None or known.ticks is self._reset_seen:
+        proof, known = self._reset_proof, self._ecu.translation.counts
+        if proof is None or known.last is None or known.last is self._reset_seen:
             return []
-        self._reset_seen, now = known.ticks, known.last_ticks_at_s
-        if not proof.look(known.ticks, now):
+        self._reset_seen, now = known.last, known.came_at_s
+        if not proof.look(known.last, now):
             return []
         if not self._reset_shown:
             self._reset_shown, self._reset_at_s = True, math.inf
@@ -321,13 +321,13 @@ class LoisEcuBoard(Board):
         self._reset_proof, self._reset_at_s = None, math.inf
 
     def _reset(self) -> Packets:
-        known = self._ecu.translation
-        steady = known.last_ticks_at_s - known.ticked_at_s >= STEADY_S
+        known = self._ecu.translation.counts
+        steady = known.came_at_s - known.changed_at_s >= STEADY_S
         if self._reset_proof is None:
             per_turn = self.settings.ticks_per_revolution
-            self._reset_proof = ResetProof(known.ticks, per_turn, steady=steady)
+            self._reset_proof = ResetProof(known.last, per_turn, steady=steady)
         else:
-            self._reset_proof.again(known.ticks, steady=steady)
+            self._reset_proof.again(known.last, steady=steady)
         return packed(self._ecu.reset())
 
     def _say_reset_again(self, now: float) -> None:

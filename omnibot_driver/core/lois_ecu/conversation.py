@@ -108,7 +108,7 @@ class LoisConversation:
         return self._understood(self._decoder.flush(now), now)
 
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
-        restarts = self._translation.restarts
+        restarts = self._translation.counts.restarts
         if reports:
             own = not all(isinstance(report, TerminalLine) for report in reports)
             if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
@@ -140,7 +140,7 @@ class LoisConversation:
         found = self._translation.readings(reports, times, unit, now)
         if self._translation.needs_date:
             self._upkeep.writer.ask_date(now)
-        if self._translation.restarts != restarts:
+        if self._translation.counts.restarts != restarts:
             self._upkeep.writer.begin(now)
         if self._upkeep.change.left:
             self._upkeep.change.left = False
@@ -153,7 +153,7 @@ class LoisConversation:
             found,
             self._decoder,
             "the board has restarted; call again"
-            if self._translation.restarts != restarts
+            if self._translation.counts.restarts != restarts
             else self._upkeep.change.reason,
             self._settings.ticks_per_revolution,
         )
@@ -195,9 +195,9 @@ class LoisConversation:
         points, translation = self._points, self._translation
         if points.stood:
             return True
-        if now - translation.last_ticks_at_s > STANDS_AFTER_S:
+        if now - translation.counts.came_at_s > STANDS_AFTER_S:
             return None
-        still_since_s = max(translation.ticked_at_s, points.stopped_at_s)
+        still_since_s = max(translation.counts.changed_at_s, points.stopped_at_s)
         if points.driving or now - still_since_s < STANDS_AFTER_S:
             return False
         points.stood = translation.odometry.counting

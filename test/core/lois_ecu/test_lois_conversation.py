@@ -85,7 +85,7 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
     rig.order(0, 0, 2.0)
     rig.board.reboot()
     rig.run(3.0)
-    assert rig.driver._translation.restarts == 1
+    assert rig.driver._translation.counts.restarts == 1
     assert rig.board.wheels[0].controller.gains.low_pass == pytest.approx(0.1)
 
 

@@ -173,7 +173,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
     rig.order(*STOP, 3.0)
     last = rig.driver.predicted(rig.now)
     assert last is not None
-    assert rig.driver.translation.restarts == 1
+    assert rig.driver.translation.counts.restarts == 1
     believed, true = first.pose.way_to(last.pose), before.way_to(rig.place)
     assert believed.way_to(true).way_m < 0.12
     assert believed.yaw_rad == pytest.approx(true.yaw_rad, abs=math.radians(12))

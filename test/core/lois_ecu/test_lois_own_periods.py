@@ -130,7 +130,7 @@ def test_a_restart_in_a_forward_drive_stops_the_robot_and_odom(firmware: str) ->
     bench.board.reboot()
     bench.run(5.0)
     assert bench.robot.stands
-    assert bench.session.board._ecu.translation.restarts == 1  # type: ignore[attr-defined]
+    assert bench.session.board._ecu.translation.counts.restarts == 1  # type: ignore[attr-defined]
     assert error(bench)[0] < 0.2
     bench.drive_on(0.3, 2.5)
     assert not bench.robot.stands

@@ -97,7 +97,7 @@ def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_m
     translation.readings([Ticks(1000, 5, 5)], [10.0], "ms", 10.0)
     translation.readings([Ticks(1200, 3, 3)], [10.2], "ms", 10.2)
     assert not translation.odometry._motion.signed
-    assert translation.ticks == Ticks(1200, 3, 3)
+    assert translation.counts.last == Ticks(1200, 3, 3)
 
 
 @pytest.mark.parametrize("restarted", [True, False])
@@ -132,4 +132,4 @@ def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
         now = 24.0 + 0.2 * step
         hear(0.2 * (step + 1) if restarted else 7.0 + now, 0)
     assert (abs(place_m[-1] - before_m) < 0.1) is restarted
-    assert driver.translation.restarts == restarted
+    assert driver.translation.counts.restarts == restarted

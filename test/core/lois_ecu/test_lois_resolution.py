@@ -96,7 +96,7 @@ def test_wheels_that_roll_back_are_no_restart(
     translation = Translation(LoisEcuSettings(ticks_per_revolution=per_turn))
     for now, ticks in reports(drive, per_turn, unit):
         translation.readings([ticks], [now], unit, now)
-    assert translation.restarts == 0
+    assert translation.counts.restarts == 0
 
 
 @pytest.mark.slow
@@ -114,7 +114,7 @@ def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit)
         rpm = 50 if now < 6.0 else -50
         translation.odometry.wrote(SetRpm(rpm, rpm), now - 0.1)
         translation.readings([ticks, odometry], [now, now], unit, now)
-    assert translation.restarts == 0
+    assert translation.counts.restarts == 0
     now, last = heard[-1]
     predicted = translation.odometry.predict(now)
     assert predicted is not None
@@ -122,7 +122,7 @@ def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit)
     assert predicted.pose.x_m == pytest.approx(way_m, abs=max(0.03, 2 * ours.tick_m))
     age = round(0.1e9) // NS_PER_COUNT[unit]
     translation.readings([Ticks(age, 0, 0)], [now + 0.2], unit, now + 0.2)
-    assert translation.restarts == 1
+    assert translation.counts.restarts == 1
 
 
 @RESOLUTIONS

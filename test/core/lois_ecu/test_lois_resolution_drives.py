@@ -35,7 +35,7 @@ def rejected(bench: Bench) -> int:
 
 def restarts(bench: Bench) -> int:
     """Return how many restarts of the board the driver has noticed."""
-    return int(bench.session.board._ecu.translation.restarts)
+    return int(bench.session.board._ecu.translation.counts.restarts)
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ def error(bench: Bench) -> tuple[float, float]:
 def restarts(bench: Bench) -> int:
     """Return how many restarts the driver has noticed."""
     board: Any = bench.session.board
-    return int(board._ecu.translation.restarts)
+    return int(board._ecu.translation.counts.restarts)
 
 
 @pytest.mark.slow
@@ -193,11 +193,11 @@ def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
     """
     slow = [(-FAST_TICKS // 2, right // 2)]
     translation = fast_wheels(slow + [(-FAST_TICKS, right)] * 22)
-    assert translation.restarts == 0
+    assert translation.counts.restarts == 0
     expected_rad = 0.0 if right < 0 else 2 * 675 * math.tau / 60 * 0.03 / 0.47
     assert translation.odometry.yaw_rad == pytest.approx(expected_rad, abs=0.15)
 
 
 def test_a_restart_of_a_board_with_fast_wheels_is_noticed() -> None:
     """The board restarts while the wheels roll at 150 RPM. Its counts begin at zero."""
-    assert fast_wheels([(-596, -596), (2, 2)]).restarts == 1
+    assert fast_wheels([(-596, -596), (2, 2)]).counts.restarts == 1

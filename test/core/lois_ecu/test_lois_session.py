@@ -341,7 +341,7 @@ def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_
     bench.run(2.0)
     assert [wheel.ticks for wheel in bench.board.wheels] == [0, 0]
     assert before.way_to(bench.odometry[-1].pose).way_m < 0.02
-    assert board._ecu.translation.restarts == 0
+    assert board._ecu.translation.counts.restarts == 0
     assert board._ecu.translation.odometry._motion.signed is (firmware == "documented")
 
 
