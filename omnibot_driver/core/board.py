@@ -121,15 +121,6 @@ class Board(Protocol):
         return None
 
     @property
-    def continues(self) -> bool:
-        """Whether the board sent the last read's bytes directly after those of the read before.
-
-        False if this is unknown. It can be true after a long silence: a network may have delivered
-        the bytes late.
-        """
-        return False
-
-    @property
     def figures(self) -> BoardFigures:
         """Counters and states for the diagnostics."""
         return BoardFigures()

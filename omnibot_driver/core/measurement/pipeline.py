@@ -56,8 +56,6 @@ class MeasurementPipeline:
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Reads whose readings are not counted yet. Each entry has the readings of one read, and
         the age in s that the newest of them had on arrival."""
-        self._begins = False
-        """Whether the next readings begin a new stream, unless ``Board.continues`` denies it."""
         self.undigested: list[Stamped] = []
         """Stamped readings that wait for ``flush``."""
 
@@ -86,11 +84,8 @@ class MeasurementPipeline:
         return self._clock.skew_ppm
 
     def restart(self) -> None:
-        """Let the next readings begin a new stream, unless they continue the old one.
-
-        They continue it if they were only read late. The clock then keeps its state.
-        """
-        self._begins = True
+        """Forget the state of the clock, because the board begins a new stream of readings."""
+        self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
         """Process readings that arrived at ``now``; return the IMU estimates that result from them.
@@ -99,10 +94,6 @@ class MeasurementPipeline:
         readings that come after it wait too.
         """
         estimates: list[ImuEstimate] = []
-        if self._begins and readings:
-            self._begins = False
-            if not self._board.continues:
-                self._clock.restart()
         edge = self._board.edge
         if len(readings) == 1 and isinstance(alone := readings[0], ImuReading):
             stamp_s = None if self.undigested else self._clock.stamp(alone, now, edge)

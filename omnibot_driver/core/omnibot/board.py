@@ -149,11 +149,6 @@ class OmniBot:
         return SampleBoundary(ahead, 0.0, (frames.IMU_LENGTH - 1 - after) * byte_s)
 
     @property
-    def continues(self) -> bool:
-        """Whether the last read continues the read before, even if it was late."""
-        return self._translation.continues
-
-    @property
     def figures(self) -> BoardFigures:
         """Counters over all connections, and the expected rates in Hz."""
         return BoardFigures(

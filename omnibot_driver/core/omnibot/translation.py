@@ -68,8 +68,6 @@ class Translation:
     * ``singles_to_come``: how many more IMU frames the fast path ``single_imu`` may decode without
       this class.
     * ``heard_s``: arrival time in s of the last decoded bytes.
-    * ``continues``: whether the board sent the bytes of the last read directly after those of the
-      read before. A pause shorter than ``LEAST_S`` is possible.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -93,7 +91,6 @@ class Translation:
         """For each frame that it decodes, the fast path subtracts 1 from ``singles_to_come``.
         ``_most_singles`` is the value before the first subtraction."""
         self.heard_s = -math.inf
-        self.continues = False
         self._behind_s = 0.0
         """Delay of the last read in s: the time from the sending of its last byte to the read."""
 
@@ -111,9 +108,7 @@ class Translation:
         before_s = self.heard_s - self._behind_s
         may_wait = left >= FULL or self._behind_s > BEHIND_S
         sent_s = self._sent_s(left, now) if may_wait else now
-        pause_s = now - self.heard_s - left / self._schedule.bytes_per_s
         self.heard_s, self._behind_s = now, now - sent_s
-        self.continues = self._behind_s > 0.0 or pause_s < LEAST_S
         readings = []
         for frame, length, before in zip(found, lengths, skipped, strict=True):
             left -= before + length
