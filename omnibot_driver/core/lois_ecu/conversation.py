@@ -28,6 +28,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     Ticks,
 )
 from omnibot_driver.core.lois_ecu.misconfiguration import (
+    NO_TICKS_ADVICE,
     OWN_GAINS,
     TOO_FAST,
     TOO_FAST_ADVICE,
@@ -116,6 +117,7 @@ class LoisConversation:
             self.mode = Mode.NOMINAL
             self._upkeep.heard_at_s = now
             self._suspicion.understood()
+            self._suspicion.heard(reports, now)
             if own:
                 self._upkeep.change.protocol_heard(now)
                 self._decoder.terminal = self._upkeep.change.terminal
@@ -227,6 +229,8 @@ class LoisConversation:
         """Advice on settings that are missing or contradict the received data, or None."""
         if self._decoder.ticks_gate.too_fast >= TOO_FAST:
             return TOO_FAST_ADVICE
+        if self._suspicion.no_ticks and Stream.TICKS not in self._settings.periods_ms:
+            return NO_TICKS_ADVICE
         if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
             return OWN_GAINS.format(gains)
         return self._suspicion.advice

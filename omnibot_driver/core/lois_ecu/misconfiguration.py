@@ -1,14 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on a misconfiguration, found in the settings or in received bytes that form no valid line.
+"""Advice on a misconfiguration, found in the settings or in what the board sends."""
 
-This module works on bytes and settings, without times.
-"""
-
+import math
 import re
+from collections.abc import Sequence
 from typing import Final
 
-from omnibot_driver.core.lois_ecu.messages import Setting
+from omnibot_driver.core.lois_ecu.messages import Report, Setting, TerminalLine, Ticks
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 GAINS: Final = (
@@ -35,6 +34,14 @@ TOO_FAST_ADVICE: Final = (
     " and odom does not show the motion: check `ticks_per_revolution`"
 )
 """Advice after ``TOO_FAST`` rejected tick reports in a row."""
+NO_TICKS_S: Final = 4.0
+LONGEST_STEP_S: Final = 0.5
+NO_TICKS_ADVICE: Final = (
+    "the board sends other reports, but no ticks, so there is no odometry, and a stop cannot be"
+    " confirmed; set `ticks_period`"
+)
+"""Advice if other reports came for ``NO_TICKS_S``, but no ticks. Another program may have turned
+the ticks off. Of the time between two reports, at most ``LONGEST_STEP_S`` counts."""
 LOOK_AT: Final = 600
 """Number of received bytes after which the user gets advice, if no valid line was among these
 bytes. The board sends at least 70 bytes per second, so the advice comes within 9 s."""
@@ -48,14 +55,30 @@ class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
     Call ``look`` with all received bytes. Call ``understood`` each time when a report was decoded
-    from these bytes.
+    from these bytes, and ``heard`` with the reports.
 
     ``advice``: what the user should check; None while no misconfiguration is suspected.
+
+    ``no_ticks``: whether the board sends reports, but no ticks.
     """
 
     def __init__(self) -> None:
         self.advice: str | None = None
         self._seen = b""
+        self._heard_at_s, self._without_s = math.inf, 0.0
+
+    @property
+    def no_ticks(self) -> bool:
+        return self._without_s > NO_TICKS_S
+
+    def heard(self, reports: Sequence[Report], now: float) -> None:
+        """Record the reports that were read at ``now``."""
+        step_s = min(max(now - self._heard_at_s, 0.0), LONGEST_STEP_S)
+        self._heard_at_s = now
+        if any(isinstance(report, Ticks) for report in reports):
+            self._without_s = 0.0
+        elif not all(isinstance(report, TerminalLine) for report in reports):
+            self._without_s += step_s
 
     def understood(self) -> None:
         """Clear the advice. A decoded report shows that the board is not misconfigured."""

@@ -13,7 +13,8 @@ from lois_drives import motion, off_m, wrong
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.lois_ecu import Stream
+from omnibot_driver.core.lois_ecu import SetPeriod, Stream, encode_command
+from omnibot_driver.core.lois_ecu.messages import PERIOD_OFF
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.lois_ecu import Firmware
 
@@ -83,6 +84,23 @@ def test_the_rate_of_the_odometry_is_that_of_the_board(firmware: str) -> None:
     bench = Bench(firmware, own_periods=True)
     bench.run(2.0)
     assert bench.session.board.figures.rates_hz == {"Odometry": pytest.approx(2.45, abs=0.1)}
+
+
+@FIRMWARE
+def test_a_board_without_ticks_gives_advice(firmware: str) -> None:
+    """Another program has turned the ticks off, and the driver does not set their period.
+
+    The user is told how to turn them on. A board that sends ticks does not give this advice.
+    """
+    bench = Bench(firmware, own_periods=True)
+    bench.run(8.0)
+    assert not any("`ticks_period`" in notice for notice in bench.notices)
+    off = SetPeriod(Stream.TICKS, PERIOD_OFF)
+    for _ in range(5):
+        bench.board.receive(encode_command(off, with_sum=True))
+        bench.run(0.1)
+    bench.run(8.0)
+    assert sum("set `ticks_period`" in notice for notice in bench.notices) == 1
 
 
 @pytest.mark.slow
