@@ -277,10 +277,20 @@ class MotionFilter:
             if wheel.course.kind == "duty" and wheel.course.target_mps * speed < 0:
                 late_m = math.hypot(late_m, REVERSES_S * speed)
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)
-        kinds = (self.wheels[0].course.kind, self.wheels[1].course.kind)
+        kinds = (self._kind(0), self._kind(1))
         if kinds != self._kinds:
             self._kinds = kinds
             self._begin_biases()
+
+    def _kind(self, index: int) -> str:
+        """Return the kind of the command that a wheel follows: "rpm", "duty" or "stop".
+
+        A Stop is a duty too. It says nothing about the error of a speed, so the error that a duty
+        had stays until the next RPM set-point.
+        """
+        course = self.wheels[index].course
+        driven = course.target_mps or (self._kinds and self._kinds[index] == "duty")
+        return course.kind if course.kind == "rpm" or driven else "stop"
 
     def _begin_biases(self) -> None:
         """Reset the estimated speed errors (biases) of both wheels.
@@ -288,8 +298,8 @@ class MotionFilter:
         In duty mode, a bias is a relative error of the speed. Otherwise, a bias is the amount by
         which the firmware rounds down the measured speed, in m/s.
         """
-        for index, wheel in enumerate(self.wheels):
-            if wheel.course.kind == "duty" and wheel.course.target_mps:
+        for index, kind in enumerate(self._kinds or ()):
+            if kind == "duty":
                 self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
             else:
                 spread = ROUNDED_STDDEV * self.rpm_mps

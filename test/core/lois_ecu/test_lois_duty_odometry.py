@@ -2,9 +2,11 @@
 
 """Odometry of a LOIS robot driven by duty. The public firmware measures little of its motion."""
 
+import math
 from dataclasses import replace
 
 import pytest
+from lois_bench import Bench
 from lois_drives import Drive, Program, Rig, nominal, off_m
 
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -38,6 +40,20 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
     assert one.way_m > 0.7
     assert off_m(one) < 0.25 * one.way_m
     assert one.sigmas < 3.0
+
+
+def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_scale() -> None:
+    """The driver still repeats Stop when the robot starts forward by duty. No ticks are counted.
+
+    A Stop is a duty too. But only a duty that drives shows how far ``duty_scale`` is off: by 30 %
+    (standard deviation) for each wheel.
+    """
+    bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
+    assert bench.written[-1][1].startswith(b":0100000000")
+    bench.drive_on(0.3, 3.0)
+    last = bench.odometry[-1]
+    assert last.pose.x_m > 0.5
+    assert math.sqrt(last.covariance.xx) > 0.15 * last.pose.x_m
 
 
 @pytest.mark.parametrize("own_periods", [False, True])
