@@ -90,7 +90,7 @@ def test_the_rate_of_the_odometry_is_that_of_the_board(firmware: str) -> None:
 def test_a_board_without_ticks_gives_advice(firmware: str) -> None:
     """Another program has turned the ticks off, and the driver does not set their period.
 
-    The user is told how to turn them on. A board that sends ticks does not give this advice.
+    The driver advises the user to set it. It gives no such advice if the board sends ticks.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(8.0)
