@@ -94,6 +94,25 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     assert last(estimates) == close((x_m, 0.0, 0.0), 0.001)
 
 
+def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
+    """A displacement is lost, and then the board restarts in a long gap that the counters hide.
+
+    A pose exactly at the new origin shows the restart, so odom stays. The expected pose counts from
+    the longest gap since the last pose, and not from the first one.
+    """
+    odometry, estimates = Odometry(SETTINGS), []
+    for number in range(75):
+        estimates += odometry.displace(earth(0.016, 0.0), number * PERIOD_S)
+        if number % 5 == 4:
+            estimates += odometry.settle(PoseReading(0.016 * (number + 1), 0.0, 0.0))
+    estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
+    for number in range(127, 132):
+        still = replace(earth(0.0, 0.0), lost=50 if number == 127 else 0)
+        estimates += odometry.displace(still, number * PERIOD_S)
+    estimates += odometry.settle(PoseReading(0.0, 0.0, 0.0, ambiguous=True))
+    assert last(estimates) == close((0.016 * 77, 0.0, 0.0), 0.001)
+
+
 @pytest.mark.parametrize(("ambiguous", "x_m"), [(True, 1.2), (False, 0.0)])
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_short_gap(
     ambiguous: bool, x_m: float

@@ -64,8 +64,10 @@ class Odometry:
         self.configure(settings)
         self._backlog = PendingDisplacements()
         self._since_gap: Pose | None = None
-        """Pose of a board that began a new frame in the last gap. None if a pose has arrived since
-        this gap, or if the robot was near the origin of the board's frame before it."""
+        """Pose of a board that began a new frame in the longest gap since the last pose. None if
+        there was no gap, or if the robot was near the origin of the board's frame before it."""
+        self._gap_lost = 0
+        """Number of displacements lost in this gap."""
         self._told_lost = 0
         """Number of lost displacements that an unconfirmed pose has shown, and that no displacement
         in ``_backlog`` counts yet."""
@@ -139,8 +141,8 @@ class Odometry:
         means_nothing = is_nowhere and reading.frame == "earth"
         self._gate.displaced(reading, bridges=means_nothing)
         lost_s = reading.lost * (reading.duration_s or 0.0)
-        if reading.lost and self._since_gap is None and self._frame.is_away:
-            self._since_gap = Pose()
+        if reading.lost > self._gap_lost and self._frame.is_away:
+            self._since_gap, self._gap_lost = Pose(), reading.lost
         if self._since_gap is not None:
             self._since_gap = advanced(self._since_gap, reading)
         if not (means_nothing or self._backlog or lost_s > LONG_GAP_S):
@@ -163,7 +165,7 @@ class Odometry:
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not self._gate.possible(told):
             return []
-        since_gap, self._since_gap = self._since_gap, None
+        since_gap, self._since_gap, self._gap_lost = self._since_gap, None, 0
         confirmed = self._gate.confirmed(told, self._track.uncertainty.gap)
         restarted = reading.restarted and (
             bool(self._backlog) or not self._frame.continues(told, self._track.uncertainty.gap)
@@ -184,7 +186,7 @@ class Odometry:
         is_long = bool(self._backlog) or lost_s > LONG_GAP_S
         if reading.ambiguous and since_gap is not None and self._began_in_gap(told, since_gap):
             self._backlog.restart()
-            return self._attach(told, 0 if self._backlog else lost)
+            return self._attach(told, 0)
         if is_long and self._settings.use_board_pose and self._reachable(told, lost_s):
             return self._resume(told, lost_s)
         estimates = self._release()
@@ -246,7 +248,7 @@ class Odometry:
         )
 
     def _began_in_gap(self, told: Pose, since_gap: Pose) -> bool:
-        """Return whether a pose shows that the board began a new frame in the last gap.
+        """Return whether a pose shows that the board began a new frame in a gap before it.
 
         The counters do not decide, because they fit both cases. ``told``: the pose.
 
