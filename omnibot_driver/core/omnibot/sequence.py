@@ -99,7 +99,8 @@ class Sequence:
         """Record that the board paused. Its counters may then continue, or restart at zero.
 
         The duration of the pause is unknown. So any other count than the next one may be that of a
-        restarted board whose first deltas were lost.
+        restarted board whose first deltas were lost. Without poses, which could disprove this, only
+        a low count is regarded as that of a restarted board.
         """
         self._paused, self._pose = True, None
 
@@ -125,7 +126,8 @@ class Sequence:
             return Step(0, None if paused else period_s)
         lost = (count - before - 1) % WRAP
         if paused:
-            return Step(0, None, restarted=lost > 0 or count == 0)
+            anew = lost > 0 or count == 0 if self._regular else count <= lost
+            return Step(0, None, restarted=anew)
         wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
         lost += wraps * WRAP
         late_s = abs((lost + 1) * period_s - elapsed_s)

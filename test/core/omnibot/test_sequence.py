@@ -61,10 +61,29 @@ def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_boa
     No count shows which case it is, if the first deltas were lost. So the driver suspects a
     restart, and the board's pose decides. Only the next count shows that the board has continued.
     """
-    sequence = begun(count)
+    sequence = Sequence()
+    for number in range(11):
+        at_s = 100.0 + (number - 10) * 0.04
+        sequence.delta((count + number - 10) % 256, at_s)
+        if number % 5 == 0:
+            sequence.pose(number // 5, at_s)
     sequence.pause()
     step = sequence.delta(first, 100.0 + after_s)
     assert step == Step(0, None, restarted=first == 0 or first != (count + 1) % 256)
+
+
+@given(counts, counts, st.floats(1.0, 1000.0))
+def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_board(
+    count: int, first: int, after_s: float
+) -> None:
+    """The board sends no poses, which could disprove a restart after a pause.
+
+    So the driver suspects a restart only if the count is not above the number of lost deltas.
+    """
+    sequence = begun(count)
+    sequence.pause()
+    step = sequence.delta(first, 100.0 + after_s)
+    assert step == Step(0, None, restarted=first <= (first - count - 1) % 256)
 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
