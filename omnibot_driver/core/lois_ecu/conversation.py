@@ -93,6 +93,7 @@ class LoisConversation:
         """Begin a new connection. The settings are then written to the board again."""
         self.mode = Mode.UNKNOWN
         self._upkeep.connect()
+        self._suspicion.connect()
         self._forget_line()
         self._translation.connect()
 
@@ -229,10 +230,11 @@ class LoisConversation:
         """Advice on settings that are missing or contradict the received data, or None."""
         if self._decoder.ticks_gate.too_fast >= TOO_FAST:
             return TOO_FAST_ADVICE
-        if self._suspicion.no_ticks and Stream.TICKS not in self._settings.periods_ms:
-            return NO_TICKS_ADVICE
-        if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
-            return OWN_GAINS.format(gains)
+        if self.mode is Mode.NOMINAL:
+            if self._suspicion.no_ticks and Stream.TICKS not in self._settings.periods_ms:
+                return NO_TICKS_ADVICE
+            if gains := own_gains(self._settings):
+                return OWN_GAINS.format(gains)
         return self._suspicion.advice
 
     @property

@@ -65,6 +65,10 @@ class Suspicion:
     def __init__(self) -> None:
         self.advice: str | None = None
         self._seen = b""
+        self.connect()
+
+    def connect(self) -> None:
+        """Begin a new connection: no reports without ticks have come in it."""
         self._heard_at_s, self._without_s = math.inf, 0.0
 
     @property

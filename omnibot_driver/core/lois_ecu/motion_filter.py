@@ -9,6 +9,7 @@ know the reports in which these values arrive.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.filter_history import FilterHistory
@@ -172,6 +173,8 @@ class MotionFilter:
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
             return
+        if self._kinds and "duty" in self._kinds:
+            self._kinds = None  # the restored biases may be those of RPM set-points
         # A restarted board does not drive, so the wheels coast. Signed counts restart at zero and
         # show how far. Otherwise the distance is estimated.
         powered_s = max(min(then_s - kept_s, LONGEST_STEP_S), 0.0)
@@ -279,8 +282,8 @@ class MotionFilter:
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)
         kinds = (self._kind(0), self._kind(1))
         if kinds != self._kinds:
-            self._kinds = kinds
-            self._begin_biases()
+            earlier, self._kinds = self._kinds or ("", ""), kinds
+            self._begin_biases([index for index in (0, 1) if kinds[index] != earlier[index]])
 
     def _kind(self, index: int) -> str:
         """Return the kind of the command that a wheel follows: "rpm", "duty" or "stop".
@@ -292,19 +295,20 @@ class MotionFilter:
         driven = course.target_mps or (self._kinds and self._kinds[index] == "duty")
         return course.kind if course.kind == "rpm" or driven else "stop"
 
-    def _begin_biases(self) -> None:
-        """Reset the estimated speed errors (biases) of both wheels.
+    def _begin_biases(self, wheels: Sequence[int]) -> None:
+        """Reset the estimated speed errors (biases) of these wheels, which have another kind now.
 
         In duty mode, a bias is a relative error of the speed. Otherwise, a bias is the amount by
         which the firmware rounds down the measured speed, in m/s.
         """
-        for index, kind in enumerate(self._kinds or ()):
-            if kind == "duty":
+        assert self._kinds is not None
+        for index in wheels:
+            if self._kinds[index] == "duty":
                 self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
             else:
                 spread = ROUNDED_STDDEV * self.rpm_mps
                 self.filter.forget(BIAS + index, ROUNDED * self.rpm_mps, spread**2)
-            self.begin_excess()
+        self.begin_excess()
 
     def begin_excess(self) -> None:
         """Reset the excess of each wheel.
