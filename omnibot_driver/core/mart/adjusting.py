@@ -27,7 +27,7 @@ same.
 ``WAG_UNITS``: motor units added to the left motor, and subtracted from the right one.
 """
 
-PROBE_S: Final = 1.0
+SUPERVISED_S: Final = 1.0
 """Time in s without an answered change of the units, after which the driver sends ``CS 0 0`` in B.
 
 This request changes nothing. Its answer shows whether the server still supervises the motion: after
@@ -61,7 +61,8 @@ class Adjusting(Moves):
         self._probes = change is None
         if change is None:
             obeyed_s = max(self._begun_s, self._obeyed_s)
-            if self.state is State.REVERSING and now >= obeyed_s + PROBE_S:
+            if self.state is State.REVERSING and now >= obeyed_s + SUPERVISED_S:
+                self._require(words.CS)
                 return self._ask(words.CS.request(0, 0), now)
             return NO_PACKETS
         right, left = change

@@ -310,7 +310,7 @@ class FrameDecoder:
 
         A frame is decided if later bytes cannot change the decision. A frame that ends at the
         position ``until`` or before is decided without waiting for later bytes. If the line has
-        carried exactly one frame and is closed, this frame is accepted.
+        carried exactly one frame and is closed, this frame is accepted if its content is usual.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
