@@ -293,7 +293,10 @@ class Conductor:
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Do nothing: these are the packets of ``MartBoard.wake``, which the pilot repeats."""
+        """Do nothing, because the ``Pilot`` already repeats ``packets`` until the server answers.
+
+        They are the packets that ``MartBoard.wake`` returns.
+        """
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now."""

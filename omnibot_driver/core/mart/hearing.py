@@ -129,9 +129,10 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Present time in s from a request to its reply, on this network.
+        """Estimate of how long a reply takes at the moment, in s from its request.
 
-        It is estimated from the queries and from the last check of the IMU.
+        It is the average duration of the answered queries, or the delay of the last check of the
+        IMU if that was longer.
         """
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 

@@ -137,13 +137,13 @@ class Starts(FailedStarts):
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return whether an earlier HELLO may reach the server after ``start``, a controlled move.
+        """Return whether ``start`` must wait, because an earlier HELLO may arrive after it.
 
-        The server might answer this HELLO just before a duplicate of the move begins. The driver
-        would take the answer as proof that there is no duplicate.
+        Only a controlled move waits. The server might answer this HELLO just before a duplicate of
+        the move begins. The driver would take the answer as proof that there is no duplicate.
 
-        The result is False for other starts. It is also False after a fresh check of the IMU: the
-        driver has waited before the check, so no earlier HELLO can arrive.
+        The wait ends after ``NAME_WAIT_S``, even if a HELLO may still arrive. There is no wait
+        after a fresh check of the IMU, because the driver has already waited before that check.
         """
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False

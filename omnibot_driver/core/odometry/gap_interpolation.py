@@ -80,7 +80,9 @@ class GapInterpolation:
         return start
 
     def prove(self, way: Pose = NO_WAY) -> None:
-        """Record that a pose was accepted. If only poses arrive, their mean motion is ``last``.
+        """Record that a pose was accepted. If only poses arrive, correct ``last`` by it.
+
+        Afterwards, ``last`` is the mean motion per displacement since the previous accepted pose.
 
         ``way``: deviation of the pose from the assumed motion, as a tangent in body axes.
         """

@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of stops on the public server: which motions each stop ends, and which hang the server.
+"""Tests of stops on the public server.
+
+The tests show which motions each stop ends, and which sequences of commands hang the server.
 
 F, B and RM are drives, R and L are spins. SM and SRM are stops on the command port. SL and SS are
-stops on the stop port, which is never answered.
+stops on the stop port. The server never replies on the stop port.
 """
 
 import pytest
