@@ -26,6 +26,16 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 # Pauses and restarts
 
 
+def restart_unheard(on: Line, boots_s: float, runs_s: float) -> None:
+    """Restart the board, and start it ``boots_s`` later. It then runs for ``runs_s`` unheard."""
+    on.loses = lambda _data, _now: True
+    on.board.receive(b"R")
+    on.run(boots_s)
+    on.board.receive(bytes(3) + b"S")
+    on.run(runs_s)
+    on.loses = loses_nothing
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", [0, 3, 5])
@@ -85,12 +95,7 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
     on.board.receive(b"P")
     on.run(1.1)
     before = on.estimates[-1].pose
-    on.loses = lambda _data, _now: True
-    on.board.receive(b"R")
-    on.run(1.0)
-    on.board.receive(bytes(3) + b"S")
-    on.run(4.0)
-    on.loses = loses_nothing
+    restart_unheard(on, 1.0, 4.0)
     on.run(1.0)
     way = before.way_to(on.estimates[-1].pose)
     assert way.way_m < 0.001
@@ -110,12 +115,7 @@ def test_a_restarted_board_that_first_moves_unheard_does_not_move_odom_to_its_or
     on.run(4.0)
     before = on.estimates[-1].pose
     assert before.way_m > 0.5
-    on.loses = lambda _data, _now: True
-    on.board.receive(b"R")
-    on.run(0.9)
-    on.board.receive(bytes(3) + b"S")
-    on.run(0.4)
-    on.loses = loses_nothing
+    restart_unheard(on, 0.9, 0.4)
     (first, *_) = on.run(0.3)
     assert before.way_to(first.pose).way_m < 0.02
 

@@ -21,8 +21,19 @@ from synthetic_board import (
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import PoseReading
+
+
+def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]]:
+    """Return an odometry that has followed a straight drive, and its estimates."""
+    odometry, estimates = Odometry(SETTINGS), list[OdometryEstimate]()
+    for number in range(deltas):
+        estimates += odometry.displace(earth(step_m, 0.0), number * PERIOD_S)
+        if number % 5 == 4:
+            estimates += odometry.settle(PoseReading(step_m * (number + 1), 0.0, 0.0))
+    return odometry, estimates
 
 
 @pytest.mark.parametrize("lost", [20, 25])
@@ -32,11 +43,7 @@ def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -
     The first pose shows the restart. It lies at the board's new origin, which is as near as the
     robot may have driven in the gap. The odometry still does not move there.
     """
-    odometry, estimates = Odometry(SETTINGS), []
-    for number in range(75):
-        estimates += odometry.displace(earth(0.004, 0.0), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(PoseReading(0.004 * (number + 1), 0.0, 0.0))
+    odometry, estimates = driven(75, 0.004)
     before = last(estimates)
     for number in range(75 + lost, 105 + lost):
         still = replace(earth(0.0, 0.0), lost=lost if number == 75 + lost else 0)
@@ -53,11 +60,7 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
     The first pose shows the restart. Odom stays, and only the way in which the robot came to rest
     is uncertain.
     """
-    odometry, estimates = Odometry(SETTINGS), []
-    for number in range(75):
-        estimates += odometry.displace(earth(0.014, 0.0), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(PoseReading(0.014 * (number + 1), 0.0, 0.0))
+    odometry, estimates = driven(75, 0.014)
     for number in range(115, 120):
         still = replace(earth(0.0, 0.0), lost=40 if number == 115 else 0)
         estimates += odometry.displace(still, number * PERIOD_S)
@@ -80,11 +83,7 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     1 cm beside it shows that the robot drove there in the gap: home, to the place where the board
     was switched on. So does a pose whose counters exclude a restart.
     """
-    odometry, estimates = Odometry(SETTINGS), []
-    for number in range(75):
-        estimates += odometry.displace(earth(0.004, 0.0), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(PoseReading(0.004 * (number + 1), 0.0, 0.0))
+    odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):
         still = replace(earth(0.0, 0.0), lost=52 if number == 127 else 0)
         estimates += odometry.displace(still, number * PERIOD_S)
@@ -100,11 +99,7 @@ def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
     A pose exactly at the new origin shows the restart, so odom stays. The expected pose counts from
     the longest gap since the last pose, and not from the first one.
     """
-    odometry, estimates = Odometry(SETTINGS), []
-    for number in range(75):
-        estimates += odometry.displace(earth(0.016, 0.0), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(PoseReading(0.016 * (number + 1), 0.0, 0.0))
+    odometry, estimates = driven(75, 0.016)
     estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
     for number in range(127, 132):
         still = replace(earth(0.0, 0.0), lost=50 if number == 127 else 0)
@@ -124,11 +119,7 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_shor
 
     Bug: odom moved to the old origin of the board, if the robot could have driven there.
     """
-    odometry, estimates = Odometry(SETTINGS), []
-    for number in range(75):
-        estimates += odometry.displace(earth(0.016, 0.0), number * PERIOD_S)
-        if number % 5 == 4:
-            estimates += odometry.settle(PoseReading(0.016 * (number + 1), 0.0, 0.0))
+    odometry, estimates = driven(75, 0.016)
     for number in range(90, 140):
         still = replace(earth(0.0, 0.0), lost=15 if number == 90 else 0)
         estimates += odometry.displace(still, number * PERIOD_S)

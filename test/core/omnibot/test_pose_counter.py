@@ -7,6 +7,16 @@ import pytest
 from omnibot_driver.core.omnibot.sequence import Sequence, Step
 
 
+def counted(deltas: int) -> Sequence:
+    """Return a sequence that has received ``deltas`` from 0 s on, and their poses."""
+    sequence = Sequence()
+    for count in range(deltas):
+        sequence.delta(count % 256, count * 0.04)
+        if count % 5 == 4:
+            sequence.pose(count // 5, count * 0.04)
+    return sequence
+
+
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
     """A pose comes after every fifth delta. The counter of a pose shows that three deltas are lost.
 
@@ -28,11 +38,7 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
     So the next delta counts only two.
     """
-    sequence = Sequence()
-    for count in range(10):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(10)
     told = [sequence.pose(number, (5 * number + 4) * 0.04) for number in (2, 3)]
     assert told == [Step(5), Step(5)]
     assert sequence.delta(22, 22 * 0.04) == Step(2)
@@ -45,11 +51,7 @@ def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> 
     The pose's counter shows the losses. By chance, it may be a counter that is also possible after
     a restart. But after such a long gap, no restart is assumed.
     """
-    sequence = Sequence()
-    for count in range(300):
-        sequence.delta(count % 256, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(300)
     first = 300 + 5 * poses
     assert sequence.pose((59 + poses) % 256, (first - 1) * 0.04) == Step(5 * poses)
     for count in range(first, first + 5):
@@ -66,11 +68,7 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
     After 1228 deltas, both counters also continue the old ones: deltas at 1280, poses at 256.
     After 1150 deltas, both show the restart. After 972, only the counter of the poses does.
     """
-    sequence = Sequence()
-    for count in range(uptime):
-        sequence.delta(count % 256, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(uptime)
     begun_s = uptime * 0.04 + 2.1
     steps = [sequence.delta(count, begun_s + count * 0.04) for count in range(5)]
     pose = sequence.pose(0, begun_s + 4 * 0.04)
@@ -90,11 +88,7 @@ def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_b
     damaged. If this counter fits neither case, it shows nothing. Only a counter from zero, too,
     shows the restart.
     """
-    sequence = Sequence()
-    for count in range(200):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(200)
     after_s = 199 * 0.04 + 2.1
     assert sequence.delta(14, after_s).restarted
     assert sequence.pose(number, after_s) == Step(0, None if restarted else 0.04, restarted)
@@ -106,11 +100,7 @@ def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(
 
     The next pose is not taken for the first one after a restart.
     """
-    sequence = Sequence()
-    for count in range(50):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(50)
     for count in range(50 + lost, 60 + lost):
         step = sequence.delta(count % 256, count * 0.04)
         assert step == Step(lost if count == 50 + lost else 0)
@@ -125,11 +115,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
     The counter of the next pose is also 0. This shows the restart.
     """
-    sequence = Sequence()
-    for count in range(206):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(206)
     after_s = 205 * 0.04 + 2.0
     assert sequence.delta(0, after_s) == Step(50)
     for count in range(1, 5):
@@ -155,11 +141,7 @@ def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_th
 
 def reopened() -> Sequence:
     """Return the state after the deltas 0 to 205, their poses, and a reconnection."""
-    sequence = Sequence()
-    for count in range(206):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(206)
     sequence.reconnect()
     return sequence
 
@@ -253,11 +235,7 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
     The counter has not wrapped, because a wrap needs more poses than the board sends in 1 s.
     """
-    sequence = Sequence()
-    for count in range(25):
-        sequence.delta(count, count * 0.04)
-        if count % 5 == 4:
-            sequence.pose(count // 5, count * 0.04)
+    sequence = counted(25)
     assert sequence.pose(0, 25 * 0.04 + 1.0) == Step(0)
 
 
