@@ -3,8 +3,9 @@
 """Queries that show which motion is in progress after the driver has used the stop port.
 
 The stop port is the server's second UDP port. After its use, a stop command on the first port (SM
-or SRM) may hang the server (docs/boards/mart.md). So the driver sends queries first. This module
-knows commands and replies; it does not know why the stop port was used. The caller passes the time.
+or SRM) may hang the server (docs/internals/mart_protocol.md). So the driver sends queries first.
+This module knows commands and replies; it does not know why the stop port was used. The caller
+passes the time.
 """
 
 import math

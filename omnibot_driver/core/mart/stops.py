@@ -294,7 +294,8 @@ class Stops(Ground, ABC):
         """Detect a stop port that still waits for the end of the motion that it should stop.
 
         This is the case if the server answers a stop command after the driver has used the stop
-        port. The port could then hang the next forward drive (RM); see docs/boards/mart.md.
+        port. The port could then hang the next forward drive (RM); see
+        docs/internals/mart_protocol.md.
 
         A reply with a number does not show this. It answers an earlier query, or the stop command
         of a turn on the spot, which leaves the stop port free.

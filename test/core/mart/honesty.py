@@ -5,7 +5,7 @@
 The measure is the normalised squared error (NEES). Its mean is 3 if the covariance is consistent.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: 50 drives for each network.
-Results: docs/boards/mart.md.
+Results: docs/internals/mart_odometry.md.
 """
 
 import math

@@ -5,7 +5,7 @@
 At the end of each drive, the robot must be at rest, and the server must answer.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: 60 drives for each
-network. Results: docs/boards/mart.md.
+network. Results: docs/internals/mart_searches.md.
 """
 
 import sys

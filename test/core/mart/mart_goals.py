@@ -3,7 +3,7 @@
 """Goals on a network with faults: helpers of the tests, and a measurement of many goals.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_goals.py 25``: 100 goals for each network.
-Results: docs/boards/mart.md.
+Results: docs/internals/mart_protocol.md.
 """
 
 import math

@@ -6,7 +6,7 @@ A world is the state of server, driver and network together.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: up to 3 late copies.
 
-Results: docs/boards/mart.md.
+Results: docs/internals/mart_searches.md.
 """
 
 import sys

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test that docs/boards/mart.md shows where the driver uses each command, or why not."""
+"""Test that the protocol page shows where the driver uses each command, or why not."""
 
 import re
 from pathlib import Path
@@ -8,7 +8,7 @@ from pathlib import Path
 from omnibot_driver.core.mart import WORDS, Kind
 from omnibot_driver.core.mart.words import NEVER_SAID
 
-PAGE = Path(__file__).parents[3] / "docs/boards/mart.md"
+PAGE = Path(__file__).parents[3] / "docs/internals/mart_protocol.md"
 
 
 def test_every_command_has_its_row() -> None:
