@@ -27,8 +27,7 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 class Line:
     """A simulated board and the odometry from its frames. All readings of its IMU are zero.
 
-    ``loses``: function that decides whether a frame is lost. Its arguments are the frame's bytes
-    and the time.
+    ``loses``: function of a frame's bytes and the time: whether the frame is lost.
     """
 
     def __init__(
@@ -100,8 +99,8 @@ class Line:
     def _commanding(self) -> bool:
         """Whether to command motion: the test wants to drive, and the board runs.
 
-        In all other cases, zeros are commanded. A motion command would be dangerous while the board
-        is paused, because the board may mistake a byte of the command for a letter such as P.
+        Otherwise zeros are commanded: a paused board may take a byte of a motion command for a
+        letter.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

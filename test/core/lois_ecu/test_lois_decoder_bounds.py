@@ -87,10 +87,9 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end of the record, but more samples follow.
+    """A torque sample of 0/0 does not end a record.
 
-    The decoder continues to read after this sample. The test uses both command bytes of a torque
-    record: the manual's one and the firmware's one.
+    The manual and the firmware use different command bytes.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

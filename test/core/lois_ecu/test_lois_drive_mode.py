@@ -38,11 +38,9 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
-    """The user sets duty mode in a forward drive, then drives backward. Odometry goes back, too.
+    """After a change to duty mode in a forward drive, odometry follows a backward drive.
 
-    After a Stop, the public firmware still has the RPM target of the forward drive. While this
-    target is positive, the firmware counts all ticks as forward. So the driver clears the target
-    before it drives by duty.
+    While its RPM target is positive, the public firmware counts all ticks as forward.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -56,10 +54,9 @@ def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -
 
 
 def test_a_lower_max_duty_stops_a_robot_that_is_driven_by_duties() -> None:
-    """``max_duty`` is lowered while the robot is driven by duties, so the robot is stopped.
+    """A lower ``max_duty`` stops a robot that is driven by duties.
 
-    The command that was given before does not move the robot again, also with a higher
-    ``max_duty``.
+    After a higher ``max_duty``, the earlier command does not move the robot again.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty", max_duty=60))
     bench.drive_on(0.3, 3.0)

@@ -30,11 +30,9 @@ def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
-    """The robot drives forward by duty. The odometry shows this, although no ticks are counted.
+    """Odometry includes a forward drive by duty in which the firmware counts no ticks.
 
-    After the board's start, the public firmware counts no ticks in such a drive, and the board's
-    own odometry (0x20) does not change. The driver does not conclude from this that the robot is at
-    rest.
+    The board's own odometry (0x20) does not change in such a drive.
     """
     one = by_duty([(3.0, PUSH)], seed)
     assert one.way_m > 0.7
@@ -43,10 +41,9 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
 
 
 def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_scale() -> None:
-    """The driver still repeats Stop when the robot starts forward by duty. No ticks are counted.
+    """Stop does not reduce the uncertainty of ``duty_scale``, which is 30 % for each wheel.
 
-    A Stop is a duty too. But only a duty that drives shows how far ``duty_scale`` is off: by 30 %
-    (standard deviation) for each wheel.
+    In the drive that follows, no ticks are counted.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     assert bench.written[-1][1].startswith(b":0100000000")
@@ -58,10 +55,7 @@ def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_sc
 
 @pytest.mark.parametrize("own_periods", [False, True])
 def test_a_report_just_after_a_stop_does_not_take_the_drive_back(*, own_periods: bool) -> None:
-    """The robot stops after a drive by duty. A report arrives while the wheels still roll out.
-
-    The public firmware has measured nothing of the drive. Its report does not show that the robot
-    was at rest during the drive.
+    """A report that arrives while the wheels roll out after a duty drive does not undo the drive.
 
     Bug: half of the distance disappeared from the odometry.
     """
@@ -75,10 +69,9 @@ def test_a_report_just_after_a_stop_does_not_take_the_drive_back(*, own_periods:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_duty_of_the_other_sign_brakes_the_wheels(seed: int) -> None:
-    """The duty changes from backward to forward. The motors are slower than the driver assumes.
+    """A change from backward to forward duty brakes the wheels, and the odometry shows the braking.
 
-    The new duty brakes the wheels: they neither coast nor stop at once. The odometry takes this
-    into account, and its error stays below 5 cm.
+    The motors are slower than the driver assumes.
     """
     one = by_duty([(3.0, BACK), (3.0, PUSH)], seed, SLOW)
     assert one.way_m > 1.4

@@ -39,7 +39,7 @@ class Reports:
     ) -> None:
         """Pass a report to the odometry.
 
-        * ``rpm``: the speeds in RPM that the board reports for the left and the right wheel.
+        * ``rpm``: reported speeds of the left and the right wheel in RPM.
         * ``ticks``: newly counted ticks.
         * ``still``: whether no wheel has ticked, so that the board's pose is the same.
         * ``passed_s``: for how long the board has moved its pose with these speeds.
@@ -69,11 +69,9 @@ class Reports:
 def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
     false_rpm: int,
 ) -> None:
-    """The left wheel starts backward. Its first reported speed is far too high.
+    """The odometry does not follow the far too high first speed that is reported at a start.
 
-    The board measures a speed from one tick to the next, and its timer wraps while a wheel is at
-    rest. It also computes its heading with this speed until the wheel ticks again. The wheel has
-    rolled a few cm, and the estimate does not show more.
+    The board measures speed between two ticks, and its timer wraps while a wheel is at rest.
     """
     reports = Reports()
     reports.order(-12, 12)
@@ -87,10 +85,10 @@ def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
 
 
 def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
-    """The left wheel is at rest, but the board still holds 11 RPM for it. The right wheel starts.
+    """Odometry does not move a resting wheel by a turn that the board computes from an old speed.
 
-    With the first tick of the right wheel, the board computes one turn for the whole pause before
-    this tick, as if the left wheel had rolled at 11 RPM. The left wheel gets none of this turn.
+    The board still holds 11 RPM for the left wheel, and turns its heading accordingly at the first
+    tick of the right wheel.
     """
     reports = Reports()
     reports.order(-12, 12)
@@ -108,10 +106,9 @@ def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
 
 
 def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
-    """The robot drives forward, and is commanded to drive backward. The wheels roll out.
+    """When forward wheels are commanded backward, reported speeds show how far they roll forward.
 
-    The board reports the speeds of wheels that roll out with the sign of the new set-point. Wheels
-    with a higher reported speed have rolled farther forward.
+    The board reports these speeds with the sign of the new set-point.
     """
 
     def way_m(rpms: tuple[int, int]) -> float:
@@ -128,10 +125,9 @@ def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
 
 
 def test_wheels_that_roll_out_backward_do_not_move_forward_by_their_ticks() -> None:
-    """The robot drives backward, and is commanded to drive forward. The wheels roll out for long.
+    """When backward wheels are commanded forward, the ticks still count as backward motion.
 
-    The board counts ticks again, but upward. Its speeds show that the wheels still roll. So the
-    filter takes the ticks for motion backward.
+    The reported speeds show that the wheels still roll backward.
     """
     reports = Reports()
     reports.order(-20, -20)

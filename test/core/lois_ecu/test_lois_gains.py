@@ -36,7 +36,7 @@ def told(bench: AnyBench) -> list[str]:
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """The user has set no gains, so the board uses its own. One notice tells the user this.
+    """If the user has set no gains, one notice says that the board uses its own gains.
 
     The diagnostics name the missing gains until the user has set them.
     """
@@ -67,10 +67,9 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 
 @pytest.mark.slow
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
-    """The driver writes its settings in rounds. The lines of a round arrive without a pause.
+    """All settings reach the board, although a busy computer sends each round without a pause.
 
-    The board loses what arrives while it sends a date. Each round requests a date, but only in its
-    last line. So every setting reaches the board.
+    The board receives nothing while it sends a date. Only the last line of a round requests a date.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
@@ -86,10 +85,9 @@ def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None
 
 
 def test_no_line_follows_the_request_for_a_date_directly() -> None:
-    """The driver writes its settings in rounds. The last line of a round requests a date.
+    """After a request for a date, the driver waits at least 20 ms before the next line.
 
-    The board receives nothing while it sends the date. So the driver sends the next line at least
-    20 ms after the request.
+    The board receives nothing while it sends the date.
     """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)
@@ -108,13 +106,10 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 
 @pytest.mark.parametrize("reads_s", [0.001, 0.01, 0.07])
 def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
-    """Stop is repeated 20 times a second while the driver writes its settings in rounds.
+    """A setting follows a Stop by at least 15 ms, unless the driver is called too seldom.
 
-    No setting is sent within 15 ms of a Stop, unless the driver is called too seldom for that.
-    In either case, all rounds are sent.
-
-    Bug: at each connection, the low-pass followed the first Stop at once. If the board then lost
-    fourteen characters, it obeyed the rest of both lines: full duty for one wheel.
+    Bug: the low-pass followed the first Stop at once. After a loss of fourteen characters, the
+    board could obey the rest of both lines: full duty for one wheel.
     """
     points = SetPoints(HOST_GAINS)
     writer = SettingsWriter(HOST_GAINS, points)
@@ -133,13 +128,11 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
 
 @pytest.mark.parametrize("waited_s", [0.1, 5.0])
 def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
-    """A round of settings waits while the robot drives. A Stop ends the drive.
+    """A setting that waited for the end of a drive is sent at least 15 ms after the Stop.
 
-    The first setting is sent at the earliest 15 ms after the Stop. If the driver is called too
-    seldom for that, it is sent half a second after the Stop.
+    If the driver is called too seldom, the setting is sent half a second after the Stop.
 
-    Bug: if the round had waited for more than half a second, the low-pass followed the Stop at
-    once.
+    Bug: if the setting had waited for more than half a second, it followed the Stop at once.
     """
     settings = LoisEcuSettings()
     points = SetPoints(settings)
@@ -162,10 +155,9 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 
 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
-    """A round begins with a Stop in the form of lines that the settings exclude.
+    """A Stop in the other form of lines is never in the same write as a setting.
 
-    Even if the driver is called late, no setting is in the same write: the beginning of this Stop
-    and the end of a setting could command full duty.
+    The beginning of this Stop and the end of a setting could command full duty.
     """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)

@@ -54,7 +54,7 @@ def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows()
 
 
 def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
-    """A read is 5 s late. Its reports are from the first second. Then the buffer was full."""
+    """If a read is 5 s late and the buffer was full, all reports are from the first second."""
     late_reads = listening()
     found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
     assert found[:-1] == about(2.0, 2.2, 2.4, 2.6)
@@ -80,18 +80,15 @@ def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
 
 
 def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
-    """The first tick report of a late read is discarded as implausible, which often happens.
-
-    The next report, a GPS report, gets a time between the tick reports before and after it.
-    """
+    """A GPS report after a discarded tick report gets a time between the tick reports around it."""
     found = read(listening(), 2.6, GpsTime(1, 2, 3), *ticks(2200, 2400, 2600))
     assert found == about(2.0, 2.2, 2.4, 2.6)
 
 
 def test_if_every_read_is_late_the_times_do_not_drift() -> None:
-    """An adapter returns three reports every 0.6 s. The board's clock is slow by 0.5 %.
+    """If every read is late, the last report of each read still gets the time of the read.
 
-    Even after 20 min, the last report of each read gets the time at which this read arrives.
+    The board's clock is slow by 0.5 % for 20 min.
     """
     late_reads = listening()
     for number in range(2000):
@@ -102,10 +99,9 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 
 
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
-    """The board restarts while its reports wait to be read. Its clock then begins at zero.
+    """A report after a restart gets the last time before the restart plus the board's clock.
 
-    The time of a later report is a sum: the time of the last report before the restart, plus the
-    board's clock in the later report.
+    The clock begins at zero with the restart.
     """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)
@@ -125,9 +121,9 @@ def test_the_clock_after_a_restart_is_not_slowed_by_sending() -> None:
 
 
 def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
-    """A clock in ns is near zero after a restart of the board, and also each time it wraps (4.3 s).
+    """If a clock in ns is near zero, the reports get the time of the read.
 
-    The driver does not know which of the two happened, so the reports get the time of the read.
+    The clock is near zero after a restart, but also after each wrap (every 4.3 s).
     """
     late_reads = listening("ns")
     found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))
@@ -145,10 +141,7 @@ def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
 def test_times_never_decrease_and_are_not_after_the_arrival(
     told: list[tuple[int, float, bool]], unit: ClockUnit
 ) -> None:
-    """The times that reports get never decrease, and are never later than the time of the read.
-
-    This is true for any values of the board's clock, and for reports that are read at any times.
-    """
+    """Report times never decrease, and are never after the read, for any values of the clock."""
     late_reads, clock_ms, now, last_s = listening(unit), 1800, 1.8, 1.8
     reports: list[Report] = []
     for passed_ms, pause_s, is_read in [*told, (200, 0.1, True)]:
@@ -239,10 +232,7 @@ def true_pose(bench: Bench) -> Pose:
     ("firmware", "stall_s"), [("documented", 0.75), ("documented", 3.0), ("firmware", 1.5)]
 )
 def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
-    """The driver stalls for seconds during a drive, and then reads all reports at once.
-
-    The pose is right, and the twist is plausible, although all motion is read in one instant.
-    """
+    """The pose is right and the twist is plausible after a stall of the driver during a drive."""
     bench = Bench(firmware)
     error_m, _ = stalled_drive(bench, stall_s)
     assert error_m < 0.06
@@ -282,10 +272,9 @@ def test_a_backlog_in_several_reads_leaves_the_pose_right(firmware: str, stall_s
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 2.5])
 def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
-    """A board with the public firmware restarts while the driver stalls, so the robot stops.
+    """The board restarts while the driver stalls, and the odometry stops with the robot.
 
-    The estimated position stops there too. If the reports of the board do not show when it has
-    restarted, the covariance includes this, in each phase of the board's timers.
+    The covariance covers the unknown time of the restart, in each phase of the board's timers.
     """
 
     def reboot(bench: Bench, since_s: float) -> None:
@@ -300,10 +289,9 @@ def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [4.2, 5.0])
 def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: float) -> None:
-    """The robot is at rest. Its board restarts during a stall. The pose does not change.
+    """A restart at rest during a stall does not change the pose.
 
-    The manual's board has a clock in ns, which begins at zero every 4.3 s, not only after a
-    restart. So only the arrival times show that the board has restarted.
+    The clock in ns wraps every 4.3 s, so only the arrival times show this restart.
     """
     bench = Bench("documented")
     for _ in range(14):
@@ -332,10 +320,9 @@ def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: f
 def test_a_full_buffer_leaves_an_error_that_the_covariance_describes(
     firmware: str, twist: BodyTwist, stall_s: float
 ) -> None:
-    """The kernel's buffer could not hold all reports, so the last ones are lost.
+    """The covariance covers the motion in reports that the kernel's full buffer has lost.
 
-    The next counts show how far the robot drove and turned since then, but not its path. The
-    covariance includes this error.
+    Later counts show the distance and the turn, but not the path.
     """
     bench = Bench(firmware)
     error_m, stddev_m = stalled_drive(bench, stall_s, twist)

@@ -82,11 +82,7 @@ def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject,
 @pytest.mark.parametrize("step_s", [0.1, 0.2, 0.4, 2.0])
 @pytest.mark.parametrize("kind", ["ticks", "ticks and odometry", "odometry", "position"])
 def test_lines_of_two_groups_never_make_one_group(kind: str, step_s: float) -> None:
-    """The end of one burst and the beginning of the next burst are lost.
-
-    The remaining lines may look like one group. But their arrival times are too far apart, so the
-    decoder makes no report of them.
-    """
+    """Lines of two damaged bursts never form one report: their arrival times are too far apart."""
     groups: list[list[Report]] = []
     for n in range(1, 7):
         ticks = Ticks(int(1000 * step_s * n), 7 + 3 * n, 5 + 2 * n)

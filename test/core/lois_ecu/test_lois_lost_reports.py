@@ -53,10 +53,9 @@ class Told:
 
 
 def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
-    """The board falls silent while it drives. After 1 s the robot may drive on or stand.
+    """0.6 s after the last report, the variances of the twist begin to include a standstill.
 
-    The driver predicts the motion for 0.6 s only. Afterwards the variances of the twist include a
-    standstill: a board that restarts has stopped.
+    A silent board may have restarted, and a board that restarts has stopped.
     """
     odometry, now = LoisOdometry(LoisEcuSettings(periods_ms=USUAL_PERIODS_MS)), 0.0
     for report in range(20):
@@ -74,12 +73,10 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
 
 @pytest.mark.parametrize("gap_s", [0.6, 0.75])
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
-    """The robot drives a curve backward, and no report arrives for a while.
+    """A gap below 1 s in a steady drive adds less than 10° to the heading's standard deviation.
 
-    The set-points do not change, so the driver knows the motion. The standard deviation of the
-    heading grows by less than 10°, and the error of the heading is less than 10° too. This is true
-    in each phase of the board's timers. The time between two reports is less than 1 s. If it were
-    longer, the board might have restarted.
+    The error of the heading is below 10° too, in each phase of the board's timers. After a longer
+    gap, the board might have restarted.
     """
     for phase in range(8):
         rig = Rig(nominal("firmware"), HOST_GAINS)
@@ -112,11 +109,9 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 
 
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
-    """Most reports are lost. All reports that arrive have the same speed of the right wheel.
+    """The covariance includes that a wheel with a constant reported speed may be at rest.
 
-    The board repeats the last speed of a wheel at rest. So the right wheel may be at rest, and the
-    estimated heading may be wrong. The covariance includes this error: the standard deviation of
-    the heading is at least half of the possible error.
+    The board repeats the last speed of a wheel at rest, and most reports are lost.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -134,11 +129,9 @@ def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports
 def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
     right_rpms: tuple[int, ...], more_deg: float
 ) -> None:
-    """In a drive backward, reports are lost for 0.9 s.
+    """A gap of 0.9 s in a drive backward raises the standard deviation of the heading.
 
-    The wheels may change their speeds in this gap, so the standard deviation of the heading grows
-    more than without a gap. If the speed of a wheel went up and down before the gap, the standard
-    deviation grows even more.
+    The increase is larger if a wheel's speed went up and down before the gap.
     """
 
     def grown_deg(gap_s: float) -> float:
@@ -155,11 +148,9 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 def test_a_large_correction_by_the_heading_of_0x20_is_not_exact(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Reports are lost while the wheels start. The next report shows an unexpected turn.
+    """The covariance includes the error of a large correction by the heading in 0x20.
 
-    The odometry corrects its heading by the heading in the board's odometry (0x20). This correction
-    has an error, because the filter is linear, but the motion of starting wheels is not. The
-    covariance includes the error.
+    The filter is linear, but the motion of starting wheels is not.
     """
 
     def stddev_deg() -> float:

@@ -20,9 +20,9 @@ GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
 def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: str) -> None:
     """The driver gives each reason for a refusal only while this reason is true.
 
-    The user sets a terminal mode during a drive, and later ends it. Until the mode is written, the
-    reason is that the mode is changing. While the board is in the mode, the reason is the mode.
-    After the user has ended the mode, the reason is that the board has not left it yet.
+    * Before a terminal mode is written: the mode is changing.
+    * In the mode: the mode itself.
+    * After the user has ended the mode: the board has not left the mode yet.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -51,11 +51,10 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """In two situations, refusals say that the terminal mode is still changing.
+    """Refusals say that the terminal mode is still changing in two cases.
 
-    In the first, the robot is at rest, but the driver must write its settings before the mode. In
-    the second, the driver has written the mode, but messages of the normal mode arrive. They show
-    that the board is not in the terminal mode.
+    * The robot is at rest, but the settings must be written before the mode.
+    * The mode is written, but messages of the normal mode still arrive.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)
@@ -72,12 +71,7 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
-    """A terminal mode that the user takes back does not lead to refusals of motion.
-
-    The user sets a terminal mode. While the robot is being stopped, the user sets ``host`` (the
-    normal mode) again. The board stays in its normal mode, so motion is allowed. The earlier motion
-    is not continued.
-    """
+    """A terminal mode that the user takes back refuses no motion, and the robot stays stopped."""
     bench = Bench("documented")
     bench.drive_on(0.3, 1.0)
     configure(bench, GPS)
@@ -92,9 +86,7 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
     """A terminal mode that is taken back does not end the stop that a new drive mode needs.
 
-    The user changes the drive mode, sets a terminal mode, and takes the terminal mode back. The new
-    drive mode can begin only at rest, so the driver continues to stop the robot. Until the robot is
-    stopped, refusals name only the drive mode.
+    Refusals then name only the drive mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

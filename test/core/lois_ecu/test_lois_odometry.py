@@ -39,7 +39,7 @@ def settled(firmware: Firmware) -> Rig:
 def test_the_boards_own_odometry_would_be_wrong() -> None:
     """In a straight drive, the board's own odometry lacks more than 15 % of the distance.
 
-    The driver does not use the board's odometry. Its own odometry lacks less than 5 %.
+    The driver's odometry lacks less than 5 %.
     """
     rig = settled("firmware")
     rig.order(20, 20, 8.0)
@@ -52,7 +52,7 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The odometry names the source of its estimates, for example "ticks" in a forward drive.
+    """The odometry names the source of its estimates.
 
     In a backward drive, the public firmware counts no ticks, so the source is "commands and
     heading".
@@ -117,7 +117,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The displacements in all odometry estimates add up to the driven distance, within 3 %.
+    """The displacements of all estimates add up to the driven distance, within 3 %.
 
     Between two estimates, the pose moves at less than 1 m/s, with a tolerance of 3 cm.
     """
@@ -278,10 +278,9 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 
 @BOTH
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
-    """On an inverted board, the board's left wheel is the robot's right wheel.
+    """With ``inverted``, the board's left wheel is the robot's right wheel: the yaw changes sign.
 
-    In this test, the driver's settings say that the board is inverted, but the simulated board is
-    not. So the estimated yaw is the simulated yaw with the other sign.
+    The simulated board is not inverted.
     """
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)
@@ -295,10 +294,9 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the board's own gains, a wheel's speed may oscillate between two reports.
+    """A report with too many ticks increases the variance of the predicted speeds.
 
-    A report with more ticks than expected is a sign of this. After such a report, the odometry
-    increases the variance of the speeds that it predicts.
+    With the board's own gains, a wheel's speed may oscillate between two reports.
     """
 
     def variance() -> float:

@@ -60,10 +60,9 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
 @pytest.mark.parametrize("name", TALKS)
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_loss_of_up_to_two_characters_makes_another_line(name: str, with_sum: bool) -> None:
-    """Up to two characters of the driver's lines are lost.
+    """If lines lose up to two characters, the firmware accepts only lines that the driver sent.
 
-    The firmware accepts only lines that the driver sent, in the order of sending. Only lenient
-    firmware is tested, because it accepts every line that strict firmware accepts.
+    Only lenient firmware is tested, because it accepts every line that strict firmware accepts.
     """
     data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
     said = heard(data, with_sum=with_sum, lenient=True)
@@ -92,10 +91,9 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """A run of characters as long as one line is lost. It spans two successive set-points.
+    """A lost run as long as one line can join two set-points to a wrong set-point.
 
-    The remaining characters are a valid line with a wrong set-point. To prevent this, the driver
-    sends set-points at least 18 ms apart.
+    The driver therefore sends set-points at least 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -103,11 +101,10 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 
 
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
-    """A Stop and the low-pass follow each other. A run of fourteen characters is lost.
+    """A lost run of fourteen characters can join a Stop and the low-pass after it to full duty.
 
-    If the Stop comes first, the remaining characters may command full duty. To prevent this, the
-    driver sends a setting at least 15 ms after a set-point. If the low-pass comes first, there is
-    no danger.
+    The driver therefore sends a setting at least 15 ms after a set-point. The other order does no
+    harm.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
@@ -121,11 +118,10 @@ def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> No
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """A motion line and an LED line lose adjacent characters, exactly as many as one line has.
+    """A lost run as long as one line can join a motion line and an LED line to a wrong motion line.
 
-    If the motion line comes first, the remaining characters may be a wrong motion line. Therefore,
-    the driver sends an LED line at least 15 ms after a motion line. If the LED line comes first,
-    there is no danger.
+    The driver therefore sends an LED line at least 15 ms after a motion line. The other order does
+    no harm.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

@@ -44,10 +44,9 @@ def error(bench: Bench) -> tuple[float, float]:
 
 @FIRMWARE
 def test_nothing_is_written_except_stop_the_low_pass_and_requests_for_a_date(firmware: str) -> None:
-    """A driver with default settings starts, and later the board restarts.
+    """With default settings, the driver writes only Stop, the low-pass and requests for one date.
 
-    Each time, the driver writes only Stop, the low-pass and requests for one date. The board keeps
-    its own periods. After the restart, the low-pass is written again.
+    The board keeps its own periods. After a restart, the low-pass is written again.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(8.0)
@@ -88,10 +87,7 @@ def test_the_rate_of_the_odometry_is_that_of_the_board(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_board_without_ticks_gives_advice(firmware: str) -> None:
-    """Another program has turned the ticks off, and the driver does not set their period.
-
-    The driver advises the user to set it. It gives no such advice if the board sends ticks.
-    """
+    """If the board sends no ticks, the driver advises once to set ``ticks_period``."""
     bench = Bench(firmware, own_periods=True)
     bench.run(8.0)
     assert not any("`ticks_period`" in notice for notice in bench.notices)
@@ -118,9 +114,9 @@ def test_a_curve_and_a_turn_are_within_3_sigma(firmware: Firmware, name: str) ->
 
 @FIRMWARE
 def test_a_stop_is_proved_by_the_ticks_and_then_the_line_is_quiet(firmware: str) -> None:
-    """The commands end, and the driver sends Stop until the ticks prove that the robot stands.
+    """After the last command, ticks prove the standstill within 2.5 s; later, the line is quiet.
 
-    This proof takes less than 5 s, after which the driver would end without a proof.
+    After 5 s, the driver would end without a proof.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(4.0)
@@ -137,10 +133,9 @@ def test_a_stop_is_proved_by_the_ticks_and_then_the_line_is_quiet(firmware: str)
 @pytest.mark.slow
 @FIRMWARE
 def test_a_restart_in_a_forward_drive_stops_the_robot_and_odom(firmware: str) -> None:
-    """The board restarts while the robot drives forward. The driver notices it, and sends Stop.
+    """After a restart in a forward drive, the driver stops the robot until a new command arrives.
 
-    The old command does not move the robot again, but a new command does. The position is right
-    within 0.2 m.
+    The position is right within 0.2 m.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(4.0)

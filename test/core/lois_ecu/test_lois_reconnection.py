@@ -87,11 +87,7 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 
 
 def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_motion() -> None:
-    """The board has sent tick counts of 5. A reset sets the counts to 0 while the wheels roll out.
-
-    The board then sends counts of 3. They are smaller than the counts before the reset, but the
-    driver does not conclude that the board counts backward.
-    """
+    """Counts that a reset clears while the wheels roll out are not taken for backward motion."""
     translation = Translation(LoisEcuSettings())
     translation.reset()
     translation.readings([Ticks(1000, 5, 5)], [10.0], "ms", 10.0)
@@ -104,10 +100,10 @@ def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_m
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """After a silence of 12 s, the tick counters are at zero. The board's clock shows why.
+    """After a silence, the board's clock shows why the tick counts are at zero.
 
-    If the clock continued during the silence, the wheels have rolled back. If the clock is near
-    zero too, the board has restarted.
+    * The clock has continued: the wheels have rolled back.
+    * The clock is near zero too: the board has restarted.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

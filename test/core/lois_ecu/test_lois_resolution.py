@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of tick counts with encoders of few and of many ticks per turn.
+"""Tests of tick counts with encoders of few and of many ticks per turn (the resolution).
 
-The number of ticks per turn (the resolution) determines the limits for the counts. With each
-resolution, the driver accepts every motion of a wheel, and still notices errors and restarts.
+With each resolution, the driver accepts every motion of a wheel, and notices errors and restarts.
 """
 
 import math
@@ -89,9 +88,9 @@ def test_a_count_that_leaps_by_five_turns_is_implausible(per_turn: int) -> None:
 def test_wheels_that_roll_back_are_no_restart(
     unit: ClockUnit, drive: list[tuple[float, float, float]], per_turn: int
 ) -> None:
-    """Wheels roll to and fro at up to 50 RPM, and the counts are signed.
+    """Falling counts of wheels that roll to and fro do not show a restart, at any resolution.
 
-    Whatever the resolution is, the driver does not take falling counts for a restart of the board.
+    The counts are signed, and the wheels roll at up to 50 RPM.
     """
     translation = Translation(LoisEcuSettings(ticks_per_revolution=per_turn))
     for now, ticks in reports(drive, per_turn, unit):
@@ -102,11 +101,9 @@ def test_wheels_that_roll_back_are_no_restart(
 @pytest.mark.slow
 @pytest.mark.parametrize(("per_turn", "unit"), [*zip(PER_TURN, cycle(("ms", "ns")), strict=False)])
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
-    """The robot drives forward at 50 RPM for 6 s, then backward for longer.
+    """The distance of a drive out and back is right within two ticks or 0.03 m, the larger of both.
 
-    The driver does not take the falling counts for a restart. The error of the distance is at most
-    two ticks or 0.03 m, whichever is larger. Then the board restarts, so its counts begin at zero.
-    The driver notices this restart.
+    The driver takes no falling count for a restart. It notices the real restart at the end.
     """
     ours = LoisEcuSettings(ticks_per_revolution=per_turn)
     translation, odometry = Translation(ours), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -127,11 +124,7 @@ def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit)
 
 @RESOLUTIONS
 def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
-    """The counts are at nine turns. A reset sets them to zero, while the wheels still roll.
-
-    The wheels roll on by a quarter turn. So after the reset, the counts are not exactly zero, but
-    near it. They still prove the reset.
-    """
+    """A reset is proved by counts near zero, although the wheels roll on by a quarter turn."""
     proof = ResetProof(Ticks(1000, 9 * per_turn, 9 * per_turn), per_turn, steady=False)
     rolled = math.ceil(per_turn / 4)
     assert not proof.look(Ticks(1200, 9 * per_turn + rolled, 9 * per_turn), 1.2)
@@ -143,9 +136,9 @@ def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
 def test_a_wheel_that_rolls_back_proves_no_reset(
     per_turn: int, before_turns: float, after_turns: float
 ) -> None:
-    """A wheel has rolled forward by at most one turn. It rolls back until its count is near zero.
+    """A small count does not prove a reset if the wheel had rolled forward by at most one turn.
 
-    The driver does not take the small count for a proof that the counts were reset.
+    The wheel may have rolled back.
     """
     before, after = math.floor(before_turns * per_turn), math.floor(after_turns * per_turn)
     proof = ResetProof(Ticks(1000, before, before), per_turn, steady=False)
@@ -154,20 +147,16 @@ def test_a_wheel_that_rolls_back_proves_no_reset(
 
 @RESOLUTIONS
 def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
-    """A wheel rests near an edge of its encoder. A jolt changes its count from 1 to 0.
-
-    The driver does not take the count of 0 for a proof that the counts were reset.
-    """
+    """A count that falls from 1 to 0 at rest, by a jolt, does not prove a reset."""
     proof = ResetProof(Ticks(1000, 1, 0), per_turn, steady=True)
     assert not proof.look(Ticks(1200, 0, 0), 1.2)
 
 
 @RESOLUTIONS
 def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
-    """A read is late by 2 s. In its last report, the clock (in ns) and the counts are near zero.
+    """All reports of a late read that may contain a restart get the time of the read.
 
-    The board may have restarted before this report, so the clock does not show when the reports
-    were sent. The driver uses the time of the read for all of them.
+    In the last report, the clock (in ns) and the counts are near zero.
     """
     late_reads = LateReads(per_turn)
     for number in range(6):
@@ -193,11 +182,10 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 
 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
-    """The user sets a new resolution while the driver waits for the result of a reset.
+    """A new resolution applies to the proof of a reset that is already in progress.
 
-    After the reset, a wheel rolls on by 250 ticks. By the new resolution, this is a quarter turn: a
-    count near zero, which proves the reset. By the old resolution, it would be more than four
-    turns, and prove nothing. The driver uses the new resolution.
+    After the reset, a wheel rolls 250 ticks: a quarter turn by the new resolution, but more than
+    four turns by the old one.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

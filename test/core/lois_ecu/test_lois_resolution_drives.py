@@ -2,9 +2,9 @@
 
 """Drives of a simulated LOIS robot with few or many encoder ticks per turn.
 
-If a wheel has more than about 1000 ticks per turn, the simulated board cannot measure the wheel's
-speed, and so cannot control it. Tests with such wheels command duties instead of RPM. The public
-firmware loses fast ticks, so the tests of this firmware have at most 60 ticks per turn.
+* Above about 1000 ticks per turn, the simulated board cannot control the wheels' speeds, so the
+  tests command duties.
+* The public firmware loses fast ticks, so its tests have at most 60 ticks per turn.
 """
 
 import math
@@ -50,10 +50,10 @@ def restarts(bench: Bench) -> int:
 def test_a_robot_with_such_encoders_drives_out_and_back(
     firmware: str, per_turn: int, mode: Literal["rpm", "duty"], speed_mps: float
 ) -> None:
-    """The odometry of a robot with few or many encoder ticks is right after a drive out and back.
+    """With few or many encoder ticks, the odometry is right after a drive out and back.
 
-    It is right within 0.1 m or 3 sigma. The driver rejects no report, and assumes no restart. Then
-    the board really restarts, and the driver notices it.
+    * Error: at most 0.1 m or 3 sigma.
+    * The driver rejects no report, and notices only the real restart at the end.
     """
     settings = LoisEcuSettings(ticks_per_revolution=per_turn, drive_mode=mode)
     bench = Bench(firmware, settings, steps=per_turn)
@@ -77,11 +77,10 @@ def test_a_robot_with_such_encoders_drives_out_and_back(
 
 @pytest.mark.slow
 def test_a_new_resolution_applies_while_the_driver_runs() -> None:
-    """The encoders have 1000 ticks per turn, but the parameter is set to 60.
+    """A new ``ticks_per_revolution`` applies at once, and ends the rejection of reports.
 
-    With 60 ticks per turn, the counts of a fast wheel are implausible, so the driver rejects them.
-    A notice names the parameter. The user sets 1000 during the connection. From then on, no report
-    is rejected.
+    The encoders have 1000 ticks per turn. With the old value of 60, the counts of a fast wheel are
+    implausible, and a notice names the parameter.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=60), steps=1000)
     bench.drive_on(0.65, 3.0)
@@ -103,9 +102,9 @@ def test_a_new_resolution_applies_while_the_driver_runs() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("per_turn", "wrapped_for_s"), [(25, 0.15), (1000, -0.25)])
 def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: float) -> None:
-    """The driver notices a restart of the board, although the board's clock wraps at that time.
+    """The driver notices a restart of the board although the board's clock (in ns) wraps then.
 
-    The clock counts ns. Just after a wrap its value is near zero, as it is after a restart.
+    Just after a wrap, the clock is near zero, as after a restart.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, wrapped_for_s)
@@ -118,10 +117,9 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """The driver does not take a wrap of the board's clock for a restart.
+    """A wrap of the board's clock is not taken for a restart, even if the counts are near zero.
 
-    The robot drives out and back. When it is back, the board's clock wraps, and a read is late. The
-    clock and the counts are then near zero, as they are after a restart.
+    The robot has driven back to its start, and a read is late.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, -2.6)

@@ -2,8 +2,7 @@
 
 """Tests of restarts that are hard to see, on a board that follows the manual.
 
-The board's clock counts ns and wraps every 4.3 s. After a restart, clock and tick counts begin at
-zero.
+The board's clock counts ns and wraps every 4.3 s. Clock and tick counts are zero after a restart.
 """
 
 import math
@@ -68,11 +67,9 @@ def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: f
 def test_a_restart_shows_although_the_clock_wraps_at_that_time(
     wrapped_for_s: float, speed_mps: float
 ) -> None:
-    """The driver notices a restart, although the board's clock wraps at about the same time.
+    """The driver notices a restart although the board's clock wraps at about the same time.
 
-    After a restart and after a wrap, the clock is near zero, so the clock alone does not show the
-    restart. The tick counts also begin at zero. The odometry does not take this for a motion
-    backward.
+    The odometry does not take the tick counts of zero for a motion backward.
     """
     bench = Bench("documented")
     begin_drive(bench, speed_mps, 2.4, wrapped_for_s)
@@ -107,10 +104,9 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 
 
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
-    """The board restarts exactly when its clock wraps, so the clock does not show the restart.
+    """A restart at a wrap of the clock is not noticed, and the covariance covers the error.
 
-    After the restart, the tick counts begin at zero. Wheels that rolled back would give the same
-    counts, so the driver assumes no restart. The covariance contains the possible error.
+    Wheels that rolled back would give the same clock and counts.
     """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.3, 0.0)
@@ -125,12 +121,9 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
-    """The driver does not take wheels that roll back for a restart of the board.
+    """Wheels that roll back until clock and counts are near zero are not taken for a restart.
 
-    The robot drives forward, and then backward until its tick counts are about zero. At this
-    moment, the board's clock wraps. So clock and counts are the same as after a restart.
-
-    ``late_s``: delay of a read at this time, in s. With a delay, the clock does not fit the arrival
+    ``late_s``: delay in s of a read at this time. With a delay, the clock does not fit the arrival
     times.
     """
     bench = Bench("documented")
@@ -186,10 +179,10 @@ def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
 
 @pytest.mark.parametrize("right", [-FAST_TICKS, FAST_TICKS])
 def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
-    """In duty mode, wheels may roll back at 150 RPM, until their counts are zero and below.
+    """Wheels that roll back at 150 RPM, in duty mode, are not taken for a restart.
 
-    Bug: each report showed a restart if the counts decreased at more than 110 RPM. The pose then
-    went wrong by radians, and each current command was discarded.
+    Bug: counts that decreased at more than 110 RPM showed a restart in each report. The heading
+    went wrong by radians, and commands were discarded.
     """
     slow = [(-FAST_TICKS // 2, right // 2)]
     translation = fast_wheels(slow + [(-FAST_TICKS, right)] * 22)

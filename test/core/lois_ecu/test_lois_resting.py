@@ -30,10 +30,9 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """The reported speed falls from 41 to 20 RPM, and then 20 RPM is repeated.
+    """From a speed of 20 RPM, three repetitions prove that a wheel is at rest; two do not.
 
-    A wheel seldom stops from a speed as high as 20 RPM. So two repetitions do not prove that the
-    wheel is at rest, but three do.
+    A wheel seldom stops from so high a speed.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
@@ -42,10 +41,9 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
-    """The reported speed falls from 60 to 28 RPM, and then the board repeats 28 RPM for long.
+    """After a fall to 28 RPM, many repetitions prove that the wheel is at rest.
 
-    No rolling wheel is that steady, so the wheel is at rest. But a wheel does not stop directly
-    from a speed as high as 28 RPM. So the value of 28 RPM is wrong: the board noticed a tick late.
+    No rolling wheel is that steady. The value of 28 RPM is wrong: the board noticed a tick late.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -54,10 +52,9 @@ def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> 
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """With the user's gains, a wheel may overshoot: its speed falls, and it then rolls steadily.
+    """With the user's gains, twenty equal reports after a fall do not prove that a wheel rests.
 
-    Its reported speeds are then like those of a wheel that comes to rest. So even twenty reports of
-    the same speed after a fall do not prove that the wheel is at rest.
+    Such a wheel may overshoot: its speed falls, and then stays constant.
     """
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 
@@ -68,10 +65,7 @@ def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """The board notices one tick late, so it once reports 27 RPM instead of 18 RPM.
-
-    The return from 27 to 18 RPM is not taken for a fall, so the wheel is not regarded as at rest.
-    """
+    """One report of 27 RPM among reports of 18 RPM, from a late tick, is not taken for a fall."""
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
@@ -93,10 +87,9 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed, the board does not report it. The estimate is 28 RPM.
+    """A fall from the estimated 28 RPM to reports of 14 RPM shows that the wheel is at rest.
 
-    Then the board reports 14 RPM several times. Compared with the estimate, the speed has fallen
-    and is then constant. So the wheel is at rest.
+    The board does not report a speed while both wheels have the same speed.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -107,21 +100,18 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 
 
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
-    """Most reports are lost. In the reports that arrive, the speed falls from 25 to 9 RPM in 1 s.
+    """If most reports are lost, a fall that seems to take 1 s still shows that the wheel rests.
 
-    A fall that takes 1 s is usually too slow for a wheel that comes to rest. But a report arrives
-    only every 0.5 s, so the true fall may have been faster. Repeated reports of 9 RPM therefore
-    prove that the wheel is at rest.
+    The true fall may have been faster than the reports show.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
 
 
 def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
-    """Most reports are lost. The reported speed falls by 6 RPM, which would usually be too little.
+    """If most reports are lost, a fall of only 6 RPM shows that the wheel is probably at rest.
 
-    Here, the fall may have begun in a gap, and may be larger than it seems. So the wheel is
-    probably at rest.
+    The true fall may have been larger, because it may have begun in a gap.
     """
     assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
     assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
@@ -129,11 +119,9 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """Most reports are lost. In the reports that arrive, the speed never falls: it rises to 14 RPM.
+    """If most reports are lost, many equal reports prove that a wheel rests, even without a fall.
 
-    The speed may have fallen in a gap, as it does before a wheel comes to rest. Therefore, many
-    reports of 14 RPM prove that the wheel is at rest. Without gaps, there was no fall, and the same
-    reports show that the wheel rolls.
+    The speed may have fallen in a gap. Without gaps, the same reports show that the wheel rolls.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
@@ -144,10 +132,7 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """Every 0.4 s, a busy computer reads three reports at once. They are late, but none is lost.
-
-    So no fall of the speed was missed. The constant speed therefore shows that the wheel rolls.
-    """
+    """Reports that are late but not lost hide no fall: a constant speed shows a rolling wheel."""
     wheel = told(13, 13, 13)
     for _ in range(10):
         for since_s in (0.4, 0.0, 0.0):

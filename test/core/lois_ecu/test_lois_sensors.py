@@ -111,11 +111,10 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """The odometry is reset while the compass shows 120°. Later headings of 120° are accepted.
+    """Headings of 120° are accepted after a reset of the odometry.
 
-    A board that faces north may falsely report 120°, so the driver rejects 120° while it expects
-    north. Here it expects 120°. The reset sets the yaw to zero, but does not change the heading
-    that the driver expects.
+    The reset sets the yaw to zero. But the driver rejects 120° only while the robot faces north,
+    because a board that faces north may falsely report 120°.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

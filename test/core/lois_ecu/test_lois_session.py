@@ -23,10 +23,9 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The user holds the board's e-stop button. The driver does not release the e-stop.
+    """The driver does not release the e-stop while the board's e-stop button is held.
 
-    The board itself would obey set-points even while the button is held. So the driver must keep
-    the e-stop latched until the button is released.
+    The board itself would obey set-points with the button held.
     """
     bench = Bench(firmware)
     bench.drive_on()
@@ -46,10 +45,9 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
-    """The user presses and releases the e-stop button while the board sends a record.
+    """A reported release of the e-stop button latches the e-stop if its press was not reported.
 
-    The board reports only the release. A release proves that the button was pressed, so the driver
-    latches the e-stop.
+    While the board sends a record, it does not report the press.
     """
     bench = Bench(firmware)
     bench.drive_on(0.6, 1.0)
@@ -68,9 +66,9 @@ def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """The motion monitor stops the robot, and its notices name parameters of the LOIS ECU.
+    """The motion monitor's notices name parameters of the LOIS ECU.
 
-    This board has no ~/start. So the notices advise the user to latch and release the e-stop.
+    This board has no ~/start, so the advice is to latch and release the e-stop.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
@@ -110,11 +108,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """The board's tick counters are already zero when the user requests a reset.
-
-    A reset sets these counters to zero, so no report can prove that the board has obeyed. The
-    driver answers that the reset is unconfirmed.
-    """
+    """A reset of tick counters that are already zero is answered as unconfirmed."""
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -127,10 +121,7 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
-    """The first reset that the driver sends is lost. So the tick counters do not change.
-
-    The driver sends the reset again. Then the tick counters prove that the board has obeyed.
-    """
+    """The driver repeats a reset that was lost, until the tick counters prove it."""
     bench = Bench(firmware)
     bench.drive_on(0.2, 1.2)
     bench.run(3.0)
@@ -148,11 +139,10 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_reset_is_not_repeated_after_the_answer_that_it_failed() -> None:
-    """A wire is broken: ticks arrive from the board, but the board does not receive the reset.
+    """After the answer that a reset failed, the driver does not send the reset again.
 
-    The driver sends the reset up to eight times, and then answers that the reset failed. After this
-    answer, the driver does not send the reset again. When the wire is repaired, a new request
-    succeeds.
+    The driver sends it two to eight times before this answer. A new request succeeds when the wire
+    is repaired.
     """
     bench = Bench("documented")
     bench.drive_on(0.2, 1.2)
@@ -192,10 +182,9 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """For 1.2 s the board sends only a record while the robot drives. The record arrives complete.
+    """For 1.2 s the board sends only a record of 1024 samples, and the record arrives complete.
 
-    The record has 1024 samples, one for each encoder tick. The encoders have 120 ticks per turn, so
-    the record is soon full.
+    With 120 encoder ticks per turn, the record is soon full.
     """
     bench = Bench(firmware, LoisEcuSettings(ticks_per_revolution=120), steps=120)
     bench.drive_on(0.6, 2.0)
@@ -227,11 +216,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The board loses power while it sends a line of text, so only a part of the line arrives.
-
-    A part of a line is not valid data. But the notice to the user says "no data", not "no valid
-    data".
-    """
+    """If a board loses power within a line, the notice says "no data", not "no valid data"."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)
@@ -246,10 +231,9 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 5, 12])
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """Whenever the board sends a report, it receives nothing for a moment.
+    """Each setting arrives at least once, although the board does not receive while it sends.
 
-    In a fixed order, the same setting could be lost every time. So the driver writes all settings
-    five times, each time in another order. Each setting arrives at least once.
+    The driver writes all settings five times, each time in another order.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -313,13 +297,11 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
 @FIRMWARE
 @pytest.mark.parametrize("stall_s", [0.0, 1.3])
 def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_s: float) -> None:
-    """The user resets the board while older tick counts are still on their way to the driver.
+    """A reset does not move the odometry if older tick counts arrive after the request.
 
-    After these older counts, the driver reads counts of 0. It does not take the decrease to 0 for a
-    motion. It also does not conclude that the board counts backward.
+    The driver does not conclude from the fall to 0 that the board counts backward.
 
-    ``stall_s``: length in s of a stall just before the reset. During the stall, the driver reads
-    nothing.
+    ``stall_s``: length in s of a stall just before the reset, in which the driver reads nothing.
     """
     bench = Bench(firmware, HOST_GAINS)
     board = bench.session.board
@@ -366,11 +348,9 @@ def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
 @FIRMWARE
 @pytest.mark.slow
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped(firmware: str) -> None:
-    """A robot drives at 0.8 m/s. The command is 0.2 m/s, and ``fastest_linear_speed`` is 0.6 m/s.
+    """After four displacements in a row faster than ``fastest_linear_speed``, the robot is stopped.
 
-    So the robot seems faster than it can be in each displacement. After one such displacement, the
-    driver does not stop the robot, because the board may have corrected its odometry. After four in
-    a row, the driver stops the robot.
+    After a single one it is not, because the board may have corrected its odometry.
     """
     bench = Bench(firmware)
     bench.session.configure(replace(SETTINGS, motion=MotionLimits(fastest_mps=0.6)), bench.now)

@@ -87,10 +87,9 @@ def encode_command_duty(left: int, right: int) -> bytes:
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """After a Stop, the driver sends RPM 0/0 before each of the first three set-points.
+    """RPM 0/0 precedes each of the first three set-points after a Stop.
 
-    RPM 0/0 makes the firmware forget the measured speed of a wheel at rest. Otherwise this wheel
-    might never start.
+    RPM 0/0 clears the measured speed of a wheel at rest, which otherwise might never start.
     """
     ecu = started()
     drive = b":020014001438\n"

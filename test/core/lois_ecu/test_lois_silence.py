@@ -14,8 +14,8 @@ from lois_bench import FIRMWARE, Bench
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> Bench:
     """Return a bench whose robot is at rest after a drive in which the connection was lost.
 
-    ``seconds``: how long the connection was lost. ``reopened``: whether the port was closed and
-    opened again.
+    * ``seconds``: how long the connection was lost.
+    * ``reopened``: whether the port was closed and opened again.
     """
     bench = Bench(firmware)
     bench.drive_on(vx, 4.0)
@@ -52,9 +52,9 @@ def off_by(bench: Bench) -> tuple[float, float]:
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
-    """The connection is lost in a drive. So no Stop arrives, and the robot drives on for metres.
+    """After a lost connection in a drive, the error of the position is within 3 sigma.
 
-    When the connection is back, the error of the estimated position is within 3 sigma.
+    No Stop arrives during the loss, so the robot drives on for metres.
     """
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m
@@ -65,11 +65,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """The connection is lost while the robot drives forward. The board continues to count ticks.
-
-    When the connection is back, these ticks show how far the robot has driven. So the odometry is
-    right within a tenth of the distance.
-    """
+    """Ticks that the board counts during a lost connection give the distance, within a tenth."""
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m

@@ -33,8 +33,8 @@ def pose(x_m: float) -> BoardOdometry:
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
     """Return the times in s, within six seconds, at which a wheel is reported as stalled.
 
-    ``ticks``: new ticks of the left and the right wheel in each 0.2 s. ``ways_m``: distance in m by
-    which the pose in the board's odometry reports (0x20) moves in each 0.2 s.
+    * ``ticks``: new ticks of the left and the right wheel in each 0.2 s.
+    * ``ways_m``: distance in m by which the pose of 0x20 moves in each 0.2 s.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -60,10 +60,9 @@ def test_wheels_that_tick_do_not() -> None:
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """A wheel is commanded backward. The public firmware does not count the ticks of such a wheel.
+    """A wheel that is commanded backward looks stalled if the board's pose does not change.
 
-    So only the pose in the board's reports can show that the wheel does not turn. If this pose does
-    not change, the driver reports a stall.
+    The public firmware counts no ticks of such a wheel.
     """
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
@@ -79,9 +78,9 @@ def looks_stalled(
 ) -> bool:
     """Return whether a wheel looks stalled.
 
-    ``rpm``: reported speeds of left and right wheel, one pair every ``every_s``. ``targets``:
-    set-points of left and right wheel, in RPM. ``resting``: for each wheel, whether the odometry
-    assumes that it is at rest.
+    * ``rpm``: reported speeds of left and right wheel, one pair every ``every_s``.
+    * ``targets``: set-points of left and right wheel, in RPM.
+    * ``resting``: for each wheel, whether the odometry assumes that it is at rest.
     """
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
@@ -100,30 +99,27 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The left wheel's reported speed never changes while the right wheel ticks.
+    """A wheel whose reported speed never changes while the other wheel ticks looks stalled.
 
-    So the left wheel looks stalled. The pose that the firmware reports changes too, but it does not
-    show a motion of the left wheel: the firmware computes it from the old speed.
+    The pose of the firmware changes too, but only by the old speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
-    """Most reports are lost. For 3 s, all reports that arrive show the same speed of a wheel.
+    """If most reports are lost, equal speeds in all reports of 3 s do not show a stall.
 
-    The wheel may have had other speeds between these reports. So the driver reports no stall until
-    it has more reports.
+    The wheel may have had other speeds between the reports.
     """
     assert not looks_stalled([(-10, 8 + step % 3) for step in range(7)], every_s=0.5)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(10)], every_s=0.5)
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """One wheel's reported speed stays the same, above the wheel's set-point.
+    """A wheel whose reported speed stays the same, above its set-point, looks stalled.
 
-    The speed controller then gives no power, so a rolling wheel would become slower, and its
-    reported speed would fall. The driver therefore regards this wheel as stalled.
+    The speed controller gives no power at such a speed, so a rolling wheel would become slower.
     """
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
@@ -132,9 +128,7 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel at a constant speed above its set-point does not look stalled.
 
-    Without feed-forward, the controller would give no power at such a speed, and a rolling wheel
-    would become slower. With feed-forward, a constant speed shows a wheel at rest only if the other
-    wheel's speed changes meanwhile.
+    The wheel does if the other wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -142,33 +136,28 @@ def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> 
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """The left wheel rolls backward, at its set-point or 10 % too fast.
+    """Two wheels that roll steadily do not look stalled.
 
-    Speeds are reported in whole RPM, so the same value comes several times.
-
-    No wheel looks stalled.
+    Each is at its set-point, or the left one is 10 % too fast. Speeds are reported in whole RPM, so
+    the same value comes several times.
     """
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """The board reports both wheels at 1.3 times their set-points. Neither looks stalled.
+    """Two wheels at about 1.3 times their set-points do not look stalled; one such wheel does.
 
-    In backward motion, wheels that roll can be too fast, but both by about the same factor. So both
-    wheels really roll. If only one wheel is reported at such a speed, this wheel looks stalled: the
-    board may be repeating the last speed of a wheel that is at rest.
+    Wheels that roll backward can be too fast by about the same factor.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """The odometry assumes that a wheel is at rest, but the board reports a speed of the wheel.
+    """A wheel that the odometry assumes to be at rest looks stalled just above its set-point.
 
-    This speed is just above the wheel's set-point, so the speed controller gives the motor no
-    power. Without power, a wheel at rest does not start. So the driver regards the wheel as
-    stalled.
+    The speed controller gives no power at this reported speed, so the wheel does not start.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -176,10 +165,9 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """A wheel is at rest, and its last reported speed is below its set-point.
+    """A wheel at rest whose last reported speed is below its set-point does not look stalled.
 
-    The board keeps reporting this speed. The speed controller uses it too, so it gives the wheel
-    power, and the wheel starts by itself. Therefore, the wheel is not reported as stalled.
+    The speed controller uses this old speed and gives power, so the wheel starts by itself.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -195,10 +183,9 @@ def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """Two wheels do not turn, and no stall is reported.
+    """No stall is reported for set-points below 2 RPM, or for duties.
 
-    In one case, the set-points are below 2 RPM, so the wheels need not turn. In the other case, the
-    command is a duty, which bypasses the speed controllers.
+    Duties bypass the speed controllers.
     """
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
@@ -208,17 +195,13 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     right_rpm: int,
 ) -> None:
-    """The right wheel's reported speed stays the same while the left wheel's speed varies.
+    """A wheel whose fast reported speed stays the same may be at rest, or may roll steadily.
 
-    The right wheel may be at rest while the board repeats the wheel's last speed. Or it may roll
-    steadily, because this speed is higher than the last speed of most wheels that stop.
+    * For a wheel at rest, the driver sends RPM 0/0, because the old speed may prevent power.
+    * For a wheel that rolls, the odometry keeps the distance.
 
-    The driver provides for both cases. It sends RPM 0/0, because a wheel at rest may get no power
-    until this command clears the old speed. It does not subtract the right wheel's distance from
-    the odometry, because the wheel may have rolled.
-
-    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. A wheel at −30 RPM
-    rolls near its set-point. A wheel at −68 RPM gets full power from a saturated controller.
+    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. −30 RPM is near
+    this set-point. −68 RPM is a wheel with full power from a saturated controller.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
@@ -246,12 +229,10 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """After a forward drive, the user commands the robot backward, but the wheels are blocked.
+    """Blocked wheels that are commanded backward do not undo the forward drive in the odometry.
 
-    The odometry does not take back the distance of the forward drive: its pose moves by less than
-    0.15 m.
-
-    ``reset``: whether the odometry is reset before the backward command.
+    The pose moves by less than 0.15 m. ``reset``: whether the odometry is reset before the backward
+    command.
     """
     driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
     for step in range(50):

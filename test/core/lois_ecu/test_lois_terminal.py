@@ -60,10 +60,9 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     [("documented", 2.5), ("documented", 2.62), ("firmware", 2.56), ("firmware", 2.68)],
 )
 def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
-    """The user sets a terminal mode during a drive. In this mode, the board reports no motion.
+    """The driver writes a terminal mode only after the robot's standstill is proved.
 
-    So the driver first stops the robot, and writes the mode only after the standstill is proved.
-    The driver does not log that the stop is unconfirmed.
+    In a terminal mode, the board reports no motion. No "unconfirmed" stop is logged.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, drive_s)
@@ -80,11 +79,10 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode. The board may miss the first lines that end the mode.
+    """The driver reports the end of a terminal mode once, even if the first lines of it are lost.
 
-    The driver still reports the end of the mode, and reports it once. It also restores the "short
-    correction", a setting of the board that the mode overwrote. Then the robot obeys commands
-    again.
+    The driver restores the "short correction" that the mode overwrote, and the robot obeys
+    commands.
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -162,10 +160,9 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 
 
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
-    """While the e-stop is latched, the driver does not overload a board in compass mode.
+    """While the e-stop is latched, the driver sends only Stop to a board in compass mode.
 
-    In this mode, the public firmware reads only 480 characters a second, so the driver sends only
-    Stop. Lines that it sends later still arrive.
+    The public firmware reads only 480 characters a second in this mode. Later lines still arrive.
     """
     bench = Bench("firmware")
     configure(bench, COMPASS)
@@ -221,10 +218,9 @@ def test_a_terminal_mode_refuses_a_reset_at_once(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
-    """The driver gives a record up, and drops this record when it arrives later.
+    """A record that the driver has given up is dropped when it arrives.
 
-    The driver gives it up because the drive mode changes during the record. The board completes the
-    record and sends it. Its lines still show the driver that the board is connected.
+    The driver gives it up because the drive mode changes. The lines still show a connected board.
     """
     bench = Bench("firmware")
     bench.record(RecordKind.TORQUE, 60)

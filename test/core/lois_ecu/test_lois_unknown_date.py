@@ -35,11 +35,9 @@ WORKS = pytest.mark.parametrize(
 class GpsRig(Rig):
     """A robot whose GPS may have no date.
 
-    ``dated``: whether the GPS has a date.
-
-    ``unknown``: value that the GPS sends instead of a date if it has none.
-
-    ``requests``: times at which the driver requested a date, in s.
+    * ``dated``: whether the GPS has a date.
+    * ``unknown``: value that the GPS sends instead of a date if it has none.
+    * ``requests``: times at which the driver requested a date, in s.
     """
 
     def __init__(

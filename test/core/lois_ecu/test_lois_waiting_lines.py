@@ -46,10 +46,9 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The board never confirms its settings. While the robot drives, the driver cannot repeat them.
+    """While the robot drives, the next wake-up of a session with an unconfirmed board is later.
 
-    The pacer must not run again and again during this time. So the next wake-up of the session is
-    always in the future.
+    With a wake-up at once, the pacer would run again and again.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
@@ -75,9 +74,8 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """While the robot drives, the LED's line comes at least 14.5 ms after a motion line.
 
-    The reason: the board may miss all bytes for up to 13 ms. If it missed the end of a motion line
-    and the beginning of the LED's line, it could read the other bytes of both as a wrong motion
-    line.
+    The board may miss bytes for up to 13 ms, and could read the rest of both lines as a wrong
+    motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

@@ -21,10 +21,9 @@ BOOT_SHORT_CORRECTION = 1.0761719
 def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
     firmware: str,
 ) -> None:
-    """The board restarts while commands arrive, and verifies checksums again.
+    """A board that restarts in a drive gets a mode line with a checksum, and drives on.
 
-    So it obeys only a mode line with a checksum. The driver sends one although the robot is
-    commanded to move, and the robot drives on.
+    After a restart, the board verifies checksums again.
     """
     bench = Bench(firmware, LoisEcuSettings(with_sum=False))
     bench.run(5.0)
@@ -38,10 +37,10 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 
 @pytest.mark.slow
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
-    """Each round of settings sets the mode, which overwrites the left short correction.
+    """The left short correction keeps its value when settings are written during a drive.
 
-    Bug: the fifth round stopped after its first line while the robot drove. The board then drove
-    with a correction of almost 0, until the next stop.
+    Bug: the fifth round stopped after its first line, the mode, which sets the correction to almost
+    0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -57,10 +56,10 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
-    """Some lines lose characters. The board has the left short correction after each writing.
+    """The board has the left short correction after each writing, even if lines lose characters.
 
-    The mode line of a round overwrites the correction with almost 0. With one line to restore it,
-    the correction was often lost in the last round.
+    The mode line of a round sets the correction to almost 0. A single line to restore it was often
+    lost.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)
@@ -80,10 +79,10 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
 def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
     firmware: str, *, with_sum: bool, commands: bool
 ) -> None:
-    """Another program has left the board with the other form of lines, while the robot rolls.
+    """A board that another program left rolling, with the other form of lines, obeys a Stop.
 
-    The driver opens the port. The board obeys a Stop within half a second, both without commands
-    and with commands to drive slowly backward.
+    The Stop comes within half a second of the opening of the port, even if the user commands
+    motion.
 
     Bug: the robot rolled on for seconds, because the board ignored each Stop.
     """

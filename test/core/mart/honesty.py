@@ -2,7 +2,7 @@
 
 """Measure whether the odometry's covariance covers its error, on networks of all kinds.
 
-The measure is the normalised squared error (NEES). Its mean is 3 if the covariance is consistent.
+The measure is the normalised squared error (NEES), whose mean is 3 for a right covariance.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: 50 drives for each network.
 Results: docs/internals/mart_odometry.md.

@@ -1,8 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds.
-
-At the end of each drive, the robot must be at rest, and the server must answer.
+"""Random drives on networks of all kinds. In the end, the robot rests and the server answers.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: 60 drives for each
 network. Results: docs/internals/mart_searches.md.
@@ -36,11 +34,9 @@ FIRMWARES: tuple[Firmware, ...] = ("documented", "firmware", "source")
 class Outcome(NamedTuple):
     """The result of one drive.
 
-    ``ended``: whether the robot rests at the end, and the server answers.
-
-    ``stop_s``: the longest time from a stop of the driver to a standstill of the robot.
-
-    ``way_m``: the driven distance.
+    * ``ended``: whether the robot rests at the end, and the server answers.
+    * ``stop_s``: the longest time in s from a stop of the driver to a standstill of the robot.
+    * ``way_m``: the driven distance in m.
     """
 
     ended: bool

@@ -2,8 +2,8 @@
 
 """A model of a MART server, its network and its driver, for a search of all reachable states.
 
-A *world* is the state of all three together. A *step* leads from one world to the next. The model
-has no clock: a late copy of a command arrives at any later step, or is lost.
+A *world* is the state of all three, and a *step* leads to the next world. The model has no clock: a
+late copy of a command arrives at any later step, or is lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -35,18 +35,14 @@ UNANSWERED: Final = 3
 class Driver(NamedTuple):
     """The state of the modelled driver.
 
-    ``proved``: whether a check has just shown that the IMU works.
-
-    ``unanswered``: the number of stops without an answer.
-
-    ``moved``: whether the last motion was a controlled move (``MOVES``).
-
-    ``counted``: whether the driver has read the encoder since the last stop. The driver reads the
-    encoder only when late commands can do no harm any more.
-
-    ``greeted``: whether the server has confirmed a stop at least once.
-
-    ``underway``: whether the motors may be under direct control (MCS), as far as the driver knows.
+    * ``proved``: whether a check has just shown that the IMU works.
+    * ``unanswered``: the number of stops without an answer.
+    * ``moved``: whether the last motion was a controlled move (``MOVES``).
+    * ``counted``: whether the encoder was read since the last stop. The driver reads the encoder
+      only when late commands can do no harm.
+    * ``greeted``: whether the server has confirmed a stop at least once.
+    * ``underway``: whether the motors may be under direct control (MCS), as far as the driver
+      knows.
     """
 
     state: State = State.UNKNOWN
@@ -84,10 +80,9 @@ Step = tuple[str, World]
 
 
 def ready(world: World, word: str) -> bool:
-    """Return whether the modelled driver is ready to send ``word``.
+    """Return whether the modelled driver may send ``word``, by the rules of the real driver.
 
-    The table of commands must allow ``word``. Before some commands, the driver must also have
-    waited for late copies and checked the IMU. These are the rules of the real driver.
+    Before some commands, the driver waits for harmful late copies, and checks the IMU.
     """
     driver = world.driver
     row = BY_TEXT[word]
@@ -155,8 +150,8 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the steps in which a controlled move ends.
 
-    A late copy of a move may have arrived during the move. Then there are two possibilities: the
-    copy has no effect, or the server executes it after the move.
+    If a late copy of a move has arrived, the server ignores the copy, or executes it after the
+    move.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -207,18 +202,16 @@ def _waits(world: World) -> Iterator[Step]:
 def sweeps_first(driver: Driver) -> bool:
     """Return whether the driver must first find out which motion is in progress.
 
-    It must if three conditions hold: the driver does not know the motion, it has used the stop
-    port, and none of its stops was ever confirmed.
+    The motion is then unknown, the stop port was used, and no stop was ever confirmed.
     """
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which the driver finds out which motion is in progress.
+    """Return the step in which, after the stop port, the driver finds out the motion in progress.
 
-    The driver does this after a stop on the stop port. The model has no step for a lost reply,
-    because a lost reply would not change the world.
+    A lost reply is not modelled, because it would not change the world.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -287,11 +280,9 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply is late, so that it may belong to an earlier command.
-
-    A late reply is never taken for the answer to a check, a controlled move or MSM. The server
-    needs more time for a check or a move than a reply can be late. So all late replies to earlier
-    commands arrive before the answer to a check or a move.
+    ``late``: whether the reply is late, so that it may belong to an earlier command. A late reply
+    never answers a check, a controlled move or MSM: checks and moves take longer than a reply can
+    be late.
     """
     driver = world.driver
     state = driver.state

@@ -2,8 +2,6 @@
 
 """A search through all reachable worlds of ``mart_model`` for one that must not occur.
 
-A world is the state of server, driver and network together.
-
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: up to 3 late copies.
 
 Results: docs/internals/mart_searches.md.
@@ -24,12 +22,9 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    What counts as wrong depends on the situation:
-
-    * If the IMU is dead, or if the driver has given up: only a crash of the server.
-    * While the driver finds out which motion is in progress: a crash, and a command port that
-      hangs.
-    * At all other times: these two and further faults.
+    * If the IMU is dead, or if the driver has given up: only a crash of the server is wrong.
+    * While the driver finds out which motion is in progress: a crash, or a command port that hangs.
+    * At all other times: further faults, too.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -76,9 +71,8 @@ def _can_stop(world: World) -> bool:
 class Found(NamedTuple):
     """The result of a search.
 
-    ``worlds``, ``steps``: how many worlds are reachable, and how many steps connect them.
-
-    ``bad``: the steps to the first forbidden world, then its fault. Empty if none was found.
+    * ``worlds``, ``steps``: how many worlds are reachable, and how many steps connect them.
+    * ``bad``: the steps to the first forbidden world, then its fault. Empty if none was found.
     """
 
     worlds: int

@@ -25,14 +25,13 @@ KIND: Final = {
 class Server(NamedTuple):
     """The state of the modelled server.
 
-    ``port``: state of the command port. "free": it accepts commands. "busy": a controlled move is
-    in progress. "waits": it waits for an IMU that does not work. "hung": it does not answer any
-    more.
-
-    ``released``: whether the stop port has stopped a motion that the server still regards as in
-    progress.
-
-    ``manual``: whether the motors are under direct control (MCS). The server then refuses motions.
+    * ``port``: state of the command port. "free": it accepts commands. "busy": a controlled move is
+      in progress. "waits": it waits for an IMU that does not work. "hung": it does not answer any
+      more.
+    * ``released``: whether the stop port has stopped a motion that the server still regards as in
+      progress.
+    * ``manual``: whether the motors are under direct control (MCS). The server then refuses
+      motions.
     """
 
     motion: Motion = Motion.NONE
@@ -111,11 +110,9 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 
 
 def servers() -> dict[Server, tuple[str, ...]]:
-    """Return all states that the server can reach if no datagram is lost.
+    """Return all states that the server can reach without lost datagrams, each with its steps.
 
-    The keys are the states. Each value is the sequence of steps from the initial state to this
-    state. A step is a command, or a failure of the IMU. The IMU does not fail during a controlled
-    move.
+    A step is a command, or a failure of the IMU. The IMU does not fail during a controlled move.
     """
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}

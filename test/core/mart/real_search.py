@@ -2,10 +2,9 @@
 
 """A bounded search that runs the real driver against the simulated firmware, in many trials.
 
-A *trial* is one run of driver and server. In most trials, a user commands a sequence of *wishes*,
-such as "forward" or "stop", and the network disturbs a single datagram. The *fate* of this datagram
-is one of four: it is lost, it is late, it arrives twice, or the IMU dies when the datagram is sent.
-In the other trials, a driver starts while the server may be executing a command.
+In most trials, a user commands a sequence of *wishes*, such as "forward" or "stop", and one
+datagram has a *fate*: it is lost, late or doubled, or the IMU dies when it is sent. In the others,
+a driver starts while the server may be executing a command.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
@@ -43,14 +42,12 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
 MOST_DATAGRAMS: Final = 7
 """Largest number of datagrams that the search disturbs for each wish, in each direction.
 
-Each of these datagrams is disturbed in a trial of its own. Regular queries and their replies are
-not counted.
+Each is disturbed in a trial of its own. Regular queries and their replies are not counted.
 """
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
 
-The driver checks the IMU shortly before each start. A start after this time is a fault of the
-driver, because its check should have found the failure.
+The driver checks the IMU shortly before each start, and must find an older failure.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
@@ -59,10 +56,9 @@ MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
 """Durations in s of the network's first interruption, which begins with the driver."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s from the end of the first interruption of the network to the start of the second.
+"""Times in s from the end of the network's first interruption to the second, which lasts 1 s.
 
-The second interruption lasts 1 s. With the value 30 s, the trial ends before the second
-interruption.
+30 s is after the end of a trial.
 """
 ENDS_S, SETTLED_S = 16.0, 1.5
 
@@ -71,24 +67,19 @@ class Trial(NamedTuple):
     """One run of the search, of one of two kinds.
 
     * With ``wishes``: a user gives these commands, and one datagram is disturbed.
-    * Without ``wishes``: the driver starts while the server executes the command ``met``, and the
-      network is interrupted.
+    * Without ``wishes``: the driver starts while the server executes ``met``, and the network is
+      interrupted.
 
-    ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
+    Attributes:
 
-    ``number``: the disturbed datagram's number in that direction, from 0. Regular queries and their
-    replies are not counted.
-
-    ``fate``: what happens to this datagram.
-
-    ``met``: command that the server is executing when the driver starts; empty for none.
-
-    ``away_s``: duration in s of the first interruption of the network. It begins when the driver
-    starts.
-
-    ``back_s``: time in s from the end of the first interruption to a second one, which lasts 1 s.
-
-    ``ways``: the directions that are interrupted.
+    * ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
+    * ``number``: the disturbed datagram's number in that direction, from 0, without regular queries
+      and their replies.
+    * ``fate``: what happens to this datagram.
+    * ``met``: command that the server is executing when the driver starts; empty for none.
+    * ``away_s``: duration in s of the first interruption, which begins when the driver starts.
+    * ``back_s``: time in s from the end of the first interruption to a second one, which lasts 1 s.
+    * ``ways``: the directions that are interrupted.
     """
 
     wishes: tuple[str, ...] = ()
@@ -191,9 +182,8 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials in which a user commands ``wishes``, and one datagram is disturbed.
 
-    A first run without faults shows how many datagrams there are in each direction. Then the first
-    datagrams of each direction are disturbed, at most ``MOST_DATAGRAMS`` for each wish. There is
-    one trial for each of these datagrams and each of the four fates.
+    There is one trial for each fate of each of the first datagrams, in each direction: at most
+    ``MOST_DATAGRAMS`` for each wish.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

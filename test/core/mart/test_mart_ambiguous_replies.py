@@ -11,10 +11,10 @@ from omnibot_driver.core.mart.words import Word
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies show that a motion had begun before it was stopped.
+    """Return whether the replies show that a motion had begun before its stop, or None if unclear.
 
-    The result is None if they do not show whether it had begun. The driver requests the motion at
-    8 s, and a stop at 10 s and 10.3 s. ``replies``: time in s and bytes of each reply.
+    The motion is requested at 8 s, and its stop at 10 s and 10.3 s. ``replies``: time in s and
+    bytes of each reply.
     """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)
@@ -28,8 +28,7 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
     """The reply to the first stop shows whether the motion had begun before this stop.
 
-    The reply "no motion" to a second stop does not show this, because the first stop may have ended
-    the motion.
+    "No motion" in reply to a second stop shows nothing: the first stop may have ended the motion.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
@@ -71,9 +70,9 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """The replies to RMRA (heading query) and then to RMCS (change of speed) have the same angle.
+    """Equal angles in reply to RMRA (heading query) and RMCS (change of speed) both count.
 
-    The driver does not take the reply to RMCS for a copy of the reply to RMRA.
+    The second reply is not taken for a copy of the first.
     """
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
@@ -82,10 +81,9 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """The driver waits for a missing reply. A copy of an older reply arrives instead.
+    """A copy of an older reply does not replace a missing reply, for which the driver still waits.
 
-    The driver recognises the copy, and continues to wait. Meanwhile it sends no other query whose
-    reply has the same form: the missing reply could be mistaken for the reply to this query.
+    Meanwhile it sends no other query whose reply has the same form.
     """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)

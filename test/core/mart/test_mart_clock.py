@@ -45,8 +45,7 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
     """After a drive, the driver never sets a correct clock back.
 
-    The driver can set the clock only to a full minute, because the server ignores the seconds. So
-    it waits, and sends the next full minute shortly before this minute begins.
+    The server ignores seconds, so the driver sends the next full minute shortly before it begins.
     """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
@@ -57,19 +56,14 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 
 
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
-    """No drive has used the server's clock yet, so the driver is allowed to set the clock back.
-
-    The driver sets it at once, to the present date and time in UTC.
-    """
+    """Before the first drive, the driver sets the server's clock at once, in UTC, even back."""
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """Between two drives, the user sets the server's clock back. The driver needs one more start.
+    """After the user has set the server's clock back, the driver starts the next drive twice.
 
-    After this change, the server begins the next drive (RM, forward) with a reported heading of
-    about 1e15°. The driver notices this, and starts the drive once more. Then the robot moves as
-    commanded.
+    The server begins this drive (RM, forward) with a heading of about 1e15°.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

@@ -96,11 +96,7 @@ def test_a_reply_answers_the_pending_request() -> None:
     ],
 )
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
-    """A late reply to an earlier request arrives while another request is pending.
-
-    The late reply has a form that the reply to the pending request never has. So the driver
-    discards it.
-    """
+    """A late reply whose form does not fit the pending request is discarded."""
     talk = conversation()
     talk.ask(word.request(), 1.0)
     assert talk.hear(parse(late), 1.4) is None
@@ -109,9 +105,9 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """An ok comes 0.3 s after a check of the IMU, but a check takes at least 0.32 s.
+    """An ok that comes 0.3 s after a check of the IMU is a late reply, and does not prove the IMU.
 
-    So this ok is a late reply to an earlier request. It does not prove that the IMU works.
+    A check takes at least 0.32 s.
     """
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
@@ -121,11 +117,7 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """RST IMU checks the IMU. A late ok to an earlier command could be taken for its reply.
-
-    So the driver waits before it sends RST IMU. It waits so long that any late ok arrives earlier
-    than the reply to RST IMU can arrive.
-    """
+    """The driver delays RST IMU (check of the IMU) until no late ok can be taken for its reply."""
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
     assert talk.hear(parse(b"ok"), 1.1) is not None
@@ -139,10 +131,9 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """The reply to a sonar query has not come in time, but it may still come late.
+    """After a lost reply to a sonar query, the driver delays the next sonar query.
 
-    The late reply could be taken for the reply to a later query. So the driver delays the next
-    sonar query. It sends the encoder query (ENC) at once, but regards the reply as doubtful.
+    The lost reply may still come late. ENC (encoder) is sent at once, but its reply is doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -163,8 +154,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 def test_every_motion_is_stopped_by_its_own_word() -> None:
     """Each motion has its own stop command, which the driver uses first.
 
-    For a controlled move, the stop command goes to the stop port. For all other motions, the stop
-    command goes to the command port.
+    The stop of a controlled move goes to the stop port, and every other to the command port.
     """
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
@@ -198,10 +188,9 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 
 
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
-    """The driver sends a stop 0.1 s after a start. The stop may overtake the start.
+    """The reply to a stop that may have overtaken its start does not prove a standstill.
 
-    So the reply to this stop does not prove that the robot is at rest. Only the reply to a later
-    stop proves this.
+    The reply to a later stop does.
     """
     stop = stopping(Motion.REFERENCE, started_s=9.9)
     assert stop.due(10.0) == (words.SRM,)
@@ -211,10 +200,9 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """After a start and a stop, two ``ok`` arrive.
+    """Two ``ok`` after a start and a stop do not prove the stop; a later "no motion" does.
 
-    Both may answer the start, because the network may have copied the reply to the start. So they
-    do not prove the stop. A later "no motion" proves it.
+    Both may answer the start, because the network may duplicate a reply.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -226,9 +214,8 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
     """Only a reply that cannot be the copy of an earlier reply proves a stop.
 
-    The driver sends a start, then two stops. The first stop may arrive before the start, so its
-    reply proves nothing. A copy of this reply may arrive until 0.6 s after the first stop. A later
-    reply proves a stop.
+    The first stop may overtake the start, so its reply proves nothing. A copy of this reply can
+    arrive until 0.6 s after the first stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -297,10 +284,9 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 
 @pytest.mark.parametrize("stale", [300, 0, -1])
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
-    """During a motion, a smaller encoder count arrives after a larger one.
+    """A count that is smaller than an earlier count of the same motion does not change the pose.
 
-    The driver concludes that the network has delayed or duplicated the smaller count. So this count
-    does not change the pose.
+    The network has delayed or duplicated such a count.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -311,9 +297,9 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A late encoder count of 3 arrives after a turn, and is mistaken for the angle of the turn.
+    """A number that is too small by the encoder is not used as the angle of a turn.
 
-    But the encoder shows that the turn was larger. So the odometry does not use the 3°.
+    The number is a late encoder count.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -326,10 +312,9 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """The first heading after the start of a forward drive (RM) is the last heading before RM.
+    """A first heading after RM (forward drive) that equals the last heading before RM is not used.
 
-    RM sets the server's heading to zero. So the server must have measured this heading before RM
-    began, and the odometry does not use it.
+    RM sets the server's heading to zero, so the equal heading was measured before RM.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
@@ -343,10 +328,9 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """The check of the IMU may fail at once, for example because the robot has no IMU.
+    """The driver accepts an early failure of the IMU check, but no early ``ok``.
 
-    So the driver accepts an early failure. It does not accept an early ``ok``, because a successful
-    check takes some time.
+    A successful check takes some time. A robot without an IMU fails at once.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

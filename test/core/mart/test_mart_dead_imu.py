@@ -66,10 +66,9 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The IMU dies in a motion. The driver stops the robot, and reports that the server is lost.
+    """If the IMU dies in a motion, the driver stops the robot and refuses motion until a restart.
 
-    It refuses motion until the server is restarted. The server variant "source" reports headings
-    only in forward drives, so this variant is tested with forward drives only.
+    The driver reports that the server is lost. "source" reports headings only in forward drives.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

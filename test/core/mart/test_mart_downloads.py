@@ -122,10 +122,9 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A stop cancels the download of the log. The result says that the server has ended.
+    """If a zero command cancels the download of the log, the result says that the server has ended.
 
-    The download begins with EXIT, which ends the server. Then a zero command cancels the download.
-    The driver can no longer get the file, so the result asks the user to copy it from the
+    EXIT, which begins the download, ends the server. The user must copy the file from the
     controller.
     """
     bench = MartBench().ready()
@@ -161,8 +160,7 @@ def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() ->
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
     """The log can be downloaded after a straight drive.
 
-    A server that was restarted has lost its log, and its heading begins at zero. But after a
-    straight drive, the heading is often zero, too. The driver does not mistake this for a restart.
+    The heading is then often zero, as after a restart, which would have erased the log.
     """
     for seed in range(3):
         bench = MartBench(firmware, seed=seed).ready()
@@ -191,10 +189,9 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
-    """The driver refuses to download the log of a server that was restarted.
+    """The driver refuses to download the log of a restarted server, which has lost its log.
 
-    The restarted server has lost its log. To download a log, the driver must send EXIT, which ends
-    the server. After a restart, the server would end without writing a log file.
+    The download would send EXIT, and the server would end without a log file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -208,9 +205,8 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The log can still be downloaded after the reply to a stop was lost.
 
-    The driver repeats the stop, and the server replies that there is no motion. A restarted server,
-    which has lost its log, would give the same reply. But it would also report a heading of zero,
-    and this server does not. So the driver knows that there was no restart.
+    The repeated stop is answered with "no motion", as after a restart. The heading, which is not
+    zero, excludes a restart.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -268,11 +264,10 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 
 
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
-    """The driver does not mistake a copy of an earlier ``ok`` for the reply to LOG.
+    """A copy of an earlier ``ok`` is not taken for the reply to LOG, which starts the log.
 
-    A gyro calibration ends with ``ok``. Then the request LOG, which starts the log, is lost, and a
-    copy of the ``ok`` arrives. The driver still knows that no log was started. So it later refuses
-    to download a log: the download would end the server.
+    LOG is lost. The driver later refuses to download a log, because the download would end the
+    server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success
@@ -318,10 +313,9 @@ def with_swapped_pieces(bench: MartBench) -> None:
 
 
 def test_a_file_whose_pieces_were_swapped_is_not_saved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The network swaps two full pieces of a file. Their lengths do not show this.
+    """A download with two swapped full pieces fails, and the next one succeeds.
 
-    The driver downloads the file twice, and the contents differ. So the download fails. The next
-    one succeeds.
+    The driver downloads the file twice, and the contents differ.
     """
     monkeypatch.setattr(FileNote, "content", FIRST + SECOND + b"end")
     bench = MartBench().ready()
@@ -336,7 +330,7 @@ def test_a_file_whose_pieces_were_swapped_is_not_saved(monkeypatch: pytest.Monke
 
 
 def test_a_file_with_equal_pieces_is_downloaded(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two full pieces of a file are equal. Nothing is lost or comes twice, so it succeeds."""
+    """A file with two equal full pieces is downloaded."""
     monkeypatch.setattr(FileNote, "content", FIRST + FIRST + b"end")
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)

@@ -29,10 +29,9 @@ def seconds_to_move(bench: MartBench, vx: float, limit_s: float = 9.0) -> float:
 def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_second(
     vx: float, firmware: Firmware
 ) -> None:
-    """Each datagram is late by up to 0.3 s. The delays begin just before the robot drives.
+    """With delays of up to 0.3 s, the driver stops none of four drives.
 
-    The test makes four drives, each with other random delays. The driver stops none of them. In at
-    most one of them, the speed is still wrong after 5 s.
+    At most one drive still has a wrong speed after 5 s.
     """
     slow = 0
     for seed in range(4):
@@ -60,10 +59,9 @@ def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
 
 
 def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> None:
-    """In the first 0.9 s of a drive, all replies to the heading query are lost. Then one arrives.
+    """A first heading that arrives 0.9 s after the start of a drive does not show a dead IMU.
 
-    It has the first known heading of the drive. One heading cannot show that the heading stays
-    constant, so the driver does not conclude that the IMU is dead. The drive continues.
+    One heading cannot show that the heading is constant, so the drive continues.
     """
     bench, started_s = on(NetworkFaults(), "firmware"), math.inf
 
@@ -80,10 +78,9 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
 
 @pytest.mark.parametrize(("firmware", "seed"), [("firmware", 5), ("source", 14)])
 def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, seed: int) -> None:
-    """Only three equal headings in a row show a dead IMU, and two do not.
+    """Two equal headings in a row do not show a dead IMU.
 
-    Replies are late, so two headings in a row are equal by chance in each drive of this test. The
-    driver does not report a dead IMU.
+    Each drive of this test has two equal headings by chance, because replies are late.
     """
     bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
     for _ in range(3):
@@ -93,10 +90,9 @@ def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, 
 
 
 def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
-    """In a drive, the reply to the encoder query (ENC) is lost. Then a later HELLO is answered.
+    """If a later HELLO is answered but ENC (encoder query) is not, the driver repeats ENC.
 
-    The server answers in order. So the answer to HELLO shows that the reply to ENC cannot come any
-    more, and the driver repeats ENC within 0.25 s of the loss.
+    The server answers in order. ENC is repeated within 0.25 s of the loss.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 3.0)
@@ -126,10 +122,9 @@ def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: b
 
 
 def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
-    """The server receives neither the start command nor any other datagram for 0.5 s.
+    """After a lost start and a silence of 0.5 s, the driver waits 1.5 s before it starts again.
 
-    The driver cannot exclude that the server was restarted. So it waits for 1.5 s before it sends a
-    start command again.
+    The server may have restarted.
     """
     bench = on(NetworkFaults(), "firmware")
     network, away_s = bench.robot.network[0], math.inf
@@ -148,10 +143,9 @@ def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
 
 
 def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
-    """A piece of a downloaded file is lost, and the driver waits for it for 1 s.
+    """An incomplete download is not taken for a restart, and the next drive begins at once.
 
-    The driver does not take this silence for a restart of the server, so the next drive begins at
-    once.
+    The driver waits for the lost piece for 1 s.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 2.0)
@@ -171,10 +165,9 @@ def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
 def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
     firmware: Firmware, lost_way: str
 ) -> None:
-    """A request for a large change of the motors' units gets no answer.
+    """After an unanswered change of the motors' units, the driver soon corrects the turn rate.
 
-    Either the request or the reply is lost. The driver finds by the measured speeds which of the
-    two was lost, so it corrects the turn rate quickly.
+    The measured speeds show whether the request or the reply was lost.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.2, 0.4, 3.0)

@@ -36,8 +36,7 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
     """On a straight drive with a gyro without noise, the driver does not report a failed IMU.
 
-    The heading hardly changes on such a drive, as if the IMU had failed. So the driver steers a
-    little. The heading then changes, which shows that the IMU works.
+    The driver steers a little, and the changes of the heading show that the IMU works.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -69,10 +68,9 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """Before the driver starts a motion, it checks the IMU, even on a slow network with losses.
+    """A start reaches the server at most 0.2 s, plus the network delays, after a check of the IMU.
 
-    The start reaches the server at most 0.2 s after the end of this check, plus the delays of the
-    network.
+    The network is slow and loses datagrams.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
@@ -92,10 +90,9 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """After a curve, the start of a forward drive is lost. So the driver sends the start again.
+    """A start that is lost after a curve is sent again; the old heading does not turn the odometry.
 
-    Until the second start arrives, the server reports the heading at the end of the curve. The
-    odometry does not turn by this heading.
+    Until the second start, the server reports the heading at the end of the curve.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -120,10 +117,9 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By chance, the first heading of a forward drive equals the last heading of the motion before.
+    """A first heading that equals the last one of the motion before is used if the encoder moves.
 
-    So it could be an old heading. But the encoder shows that the drive has begun, and therefore the
-    driver uses this heading.
+    The encoder shows that the drive has begun, so the heading is not an old one.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -167,8 +163,7 @@ def test_diagnostics_have_the_rate_of_odom() -> None:
 def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
     """The robot reaches two goals within 10 cm and 6 degrees.
 
-    Then a third goal is given. While the robot drives to it, a twist command comes. The robot obeys
-    this command instead.
+    A twist command replaces a third goal.
     """
     bench = MartBench(firmware).ready()
     for x_m, y_m, yaw_rad in ((0.8, 0.4, 1.0), (0.0, 0.0, 0.0)):

@@ -45,11 +45,9 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The robot moves without a command. The driver does not take this for a defect of the server.
+    """If a later RM was obeyed, a motion without a command does not show a defective server.
 
-    A defective server rejects a forward drive (RM), and moves the robot nevertheless. Here, the
-    server rejected an RM some time ago, but it has obeyed another RM since then. So the driver
-    still allows motion.
+    A defective server rejects RM (forward drive), and moves the robot nevertheless.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -63,10 +61,9 @@ def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> 
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects a forward drive (RM), and gives an old error as the reason.
+    """The driver repeats RM (forward drive) if the server rejects RM because of an old obstacle.
 
-    The old error is an obstacle that ended a backward drive. The front sonar shows no obstacle, so
-    the driver repeats RM.
+    The obstacle ended a backward drive, and the front sonar shows no obstacle.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
@@ -78,10 +75,9 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """The server rejects a forward drive (RM), but the robot moves.
+    """If a server rejects RM (forward drive) but the robot moves, the motors are switched off.
 
-    The driver sends a stop. The server does not obey it, because it knows of no motion. So the
-    driver switches the motors off, and then refuses motion.
+    The server knows of no motion, so it obeys no stop. The driver then refuses motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
@@ -93,10 +89,9 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """The server rejects a forward drive (RM). Five seconds later, a person pushes the robot.
+    """A push five seconds after a rejected RM (forward drive) does not show a defective server.
 
-    The driver does not regard the server as defective. A defective server would reject RM, and move
-    the robot at once. Here the robot moves much later, so the driver still allows motion.
+    A defective server would move the robot at once. The driver still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -112,10 +107,9 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """The server rejects a forward drive (RM). Later, it obeys a late copy of this RM.
+    """A robot that moves by a late copy of a rejected RM (forward drive) shows no defective server.
 
-    At this time, the network also loses replies. The driver stops the robot. It does not regard the
-    server as defective, so it does not refuse motion permanently.
+    The network loses replies, too. The driver stops the robot, and later allows motion.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

@@ -74,10 +74,9 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
-    """One or both motors are stuck, so the driver switches both motors off.
+    """If a motor is stuck, the driver switches both motors off, and the covariance covers the turn.
 
-    If only the right motor is stuck, the left wheel may turn the robot before the motors are off.
-    The covariance of the odometry includes this turn.
+    With a stuck right motor, the left wheel may turn the robot before.
     """
     bench = MartBench(firmware).ready()
     if driving:
@@ -159,10 +158,9 @@ def test_nobody_answers() -> None:
 
 @pytest.mark.parametrize("word", [b"ENC", b"L"])
 def test_a_command_that_the_server_does_not_know_is_named_as_the_reason(word: bytes) -> None:
-    """The manual lists neither ENC nor L, so a server may refuse them as not supported.
+    """If a server does not support ENC or L, the driver names the server as the cause.
 
-    The driver says that the server is the cause. It does not blame an obstacle or another program,
-    and it is not silent.
+    The manual lists neither command. The driver does not blame an obstacle.
     """
     bench = MartBench("documented")
     inner = bench.robot.receive

@@ -18,16 +18,14 @@ from omnibot_driver.simulator.mart import Firmware
 HEAVY_S = 0.2
 """Time constant in s of the motors of a heavy robot.
 
-After a stop, the server waits for the wheels to come to rest, but only for a limited time. The
-wheels of this robot turn for longer than this time.
+The wheels turn for longer after a stop than the server waits for a standstill.
 """
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
     """The time without a change of the heading begins at the first heading of a drive.
 
-    Before the first heading, the driver cannot know whether the heading changes. So the time since
-    the start of the drive is not used. Here, the first heading comes 0.7 s after the start.
+    Before this heading, which comes 0.7 s after the start, a change cannot be seen.
     """
     heading = RelativeHeading()
     heading.begin(10.0, anew=True)
@@ -66,9 +64,9 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
 def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
     before: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The wheels of a heavy robot still turn long after a stop, so the server reports a failure.
+    """A slow stop of a heavy robot does not discard the next goal.
 
-    A goal follows. One notice says that the wheels still turned, and the robot reaches the goal.
+    The server reports a failure, because the wheels still turn. One notice says so.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     bench.command(*before, 3.0)
@@ -101,11 +99,10 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 @pytest.mark.slow
 @pytest.mark.parametrize("stuck", ["right", "both"])
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
-    """A motor is stuck, so the turn towards a goal does not begin. The driver discards the goal.
+    """If a motor is stuck in the turn to a goal, the driver discards the goal.
 
-    The server reports the failure "start timedout". This failure alone is not a reason to discard a
-    goal: the server also reports it if a heavy robot still moves some time after a turn. In that
-    case, the driver continues to the goal.
+    The server's "start timedout" is not a sufficient reason: a heavy robot that still moves causes
+    it, too.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -116,11 +113,9 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 
 @pytest.mark.slow
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
-    """An obstacle ends a move early. The driver does not make a later move longer.
+    """A move of a heavy robot that an obstacle ends early does not make a later move longer.
 
-    The robot is heavy, so the server's reply to this move reports only a slow stop. The reply to
-    the next move reports the obstacle. So the driver learns nothing from the distance of the short
-    move. For a later goal, it requests the usual distance.
+    The reply to this move reports only a slow stop; the next reply reports the obstacle.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -143,11 +138,10 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn has a wrong rate, so the driver stops it and starts it again, with other motor units.
+    """A turn with a wrong rate is started again with other motor units, even without an angle.
 
-    To choose the units, the driver needs the speed of the motors. It measures this speed by the
-    encoder, because it gets no angle in the reply to the stop: a heavy robot stops too slowly, or
-    the network delays the reply too long.
+    The angle in the reply to the stop is missing if the robot stops slowly or the reply is late.
+    The encoder then shows the speed of the motors.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)
@@ -163,10 +157,9 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     firmware: Firmware,
 ) -> None:
-    """After a stop or an e-stop, the wheels of a heavy robot turn for another 1.3 s.
+    """A heavy robot that coasts for 1.3 s after a stop or an e-stop is not reported as moving.
 
-    The server waits only 0.6 s for the end of the motion, and then reports a failure. The driver
-    does not report that the robot moves without a command.
+    The server reports a failure after 0.6 s.
     """
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):
@@ -182,8 +175,7 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
 def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
     """Every reply shows that the server is not silent, even a reply without a measurement.
 
-    The last reply before a gap in the network contains only the server's name. The driver measures
-    the silence from this reply.
+    The last reply before a gap has only the server's name, and the silence is measured from it.
     """
     bench = MartBench().ready()
     bench.speaks = False

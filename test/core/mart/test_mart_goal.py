@@ -30,11 +30,7 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """The driver makes several equal moves, and many of them end with the same encoder count.
-
-    An equal count could be an old one, from the move before. Nevertheless, the odometry adds the
-    motion of every move.
-    """
+    """The odometry adds each of several equal moves, although many end with equal counts."""
     bench, goal = MartBench(firmware).ready(), Pose()
     for _ in range(4):
         goal = goal.moved(step)
@@ -69,11 +65,7 @@ def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: flo
 def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     firmware: Firmware,
 ) -> None:
-    """While the robot makes a move to a goal, the user gives a new goal.
-
-    When the server has replied to this move, the driver begins the first move to the new goal at
-    once.
-    """
+    """A new goal interrupts the move to the old goal, and its first move begins within 1.6 s."""
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
     bench.go_to(2.0, 0.0, 0.0)
@@ -104,9 +96,9 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 
 
 def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
-    """The network loses every straight move to a goal, so the robot stays where it is.
+    """A goal that is not reached after ``MOST_MOVES`` moves is discarded.
 
-    After MOST_MOVES moves, the driver gives the goal up, and says how far away it is.
+    The network loses every straight move. A notice has the remaining distance.
     """
     bench = MartBench().ready()
     receive = bench.robot.receive
@@ -120,10 +112,9 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 
 
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
-    """A goal is 30 m away. After 80 s, or about 20 m, the driver stops the straight move.
+    """A straight move that is stopped after 80 s (about 20 m) does not use up the moves to a goal.
 
-    From then on, the driver counts the moves to this goal from zero again. So the robot can reach a
-    goal at any distance, although the number of moves to a goal is limited.
+    From then on, the moves are counted from zero again, so a goal can be at any distance.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)
@@ -136,10 +127,9 @@ def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_mov
 
 @pytest.mark.parametrize("x_m", [1e4, 1e9, 1e60, 1e308, -1e300])
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
-    """A goal is farther away than 1000 m, so the driver rejects it.
+    """A goal that is farther away than 1000 m is rejected, and a later goal still moves the robot.
 
-    A later goal still moves the robot. The limit exists because the command for a farther goal
-    could be too long for a request.
+    The command for a farther goal could be too long for a request.
     """
     bench = MartBench().ready()
     with pytest.raises(CommandRefused, match="the limit is 1000 m"):
@@ -180,9 +170,9 @@ def test_a_goal_ends_after_a_move_in_which_the_wheel_counts_the_wrong_way(
 
 @pytest.mark.parametrize("firmware", ["firmware", "source", "documented"])
 def test_a_turn_of_a_slow_robot_is_not_taken_for_two_runs(firmware: Firmware) -> None:
-    """The robot is half as fast as usual, and `linear_scale` says so. The network is good.
+    """A long turn of a slow robot is not taken for two runs of the turn.
 
-    A turn takes long, but the driver does not conclude that it may have run twice.
+    ``linear_scale`` says that the robot is half as fast as usual.
     """
     settings = MartSettings(speed_per_unit=0.004)
     bench = MartBench(firmware, settings=settings, speed_mps_per_unit=0.004).ready()

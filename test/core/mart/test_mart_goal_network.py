@@ -39,19 +39,18 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed: int) -> None:
-    """A quarter of all datagrams is lost, so the driver sends HELLO several times a second.
+    """A goal is reached or discarded although a quarter of all datagrams is lost.
 
-    Before a move, the driver waits until no HELLO is on its way, but not for ever. The goal is
-    reached or discarded.
+    Before a move, the driver waits until no HELLO is on its way, but only for a limited time.
     """
     bench = on(NetworkFaults(lose=0.25, delay_s=0.01), EVERY_FIRMWARE[seed % 3], seed)
     reach(bench, Pose(0.6, 0.3, 1.5))
 
 
 def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -> None:
-    """The driver has just sent HELLO, so a move waits; the goal is cancelled in this wait.
+    """A goal that is cancelled while its move waits for a HELLO does not shorten the next wait.
 
-    Regression: the limit of 2 s was still counted from that wait, so the next move did not wait.
+    Bug: the limit of 2 s was counted from the first wait.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.3, 0.0, 0.0)
@@ -68,10 +67,9 @@ def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -
 
 
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
-    """A tenth of all datagrams is lost in each direction. At most one of twelve goals is discarded.
+    """If a tenth of all datagrams is lost each way, at most one of twelve goals is discarded.
 
-    The driver discards a goal if it cannot exclude that a move was duplicated. The covariance
-    covers the error of the odometry.
+    The covariance covers the error of the odometry.
     """
     discarded = 0
     for seed in range(4):
@@ -89,10 +87,9 @@ def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
-    """A tenth of all datagrams arrives twice, so the server runs some moves twice.
+    """If a tenth of all datagrams arrives twice, few goals are discarded.
 
-    The driver stops the second run of a move and estimates the first run. It discards few goals. If
-    the odometry is wrong, its covariance is large enough for this error.
+    The driver stops the second run of a move. The covariance covers the error of the odometry.
     """
     said = ""
     for seed in (0, 1, 5, 6, 10, 11):
@@ -155,9 +152,9 @@ def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
 def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_before(
     word: bytes, later_s: float
 ) -> None:
-    """A move runs twice. The user resets the odometry before the driver reads the encoder.
+    """A reset after a move that runs twice does not add the first run to the pose.
 
-    The first run was before the reset, so the driver does not add it to the pose.
+    The reset comes before the driver reads the encoder.
     """
     bench = on(NetworkFaults(), "source")
     reach(bench, Pose(0.6, 0.0, 0.0))
@@ -179,11 +176,9 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 
 
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
-    """A first move that is too short is not taken for an incomplete second run.
+    """A first move of half the requested distance is not taken for an incomplete second run.
 
-    The robot drives half as far as requested. Then queries are lost for 0.7 s, so a second run is
-    possible, and the driver sends a stop. But the driver has not learned how far this robot drives
-    in one run. So the short distance proves no second run, and nothing is added to the pose.
+    The driver has not learned how far this robot drives, so it adds nothing to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -205,10 +200,9 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
-    """The reply to each turn is lost, so the driver sends a stop. The server answers "no motion".
+    """A turn whose reply is lost is counted from zero, not from the last count before the turn.
 
-    The answer shows that the turn was completed. The encoder counts each turn from zero, so the
-    odometry must not subtract the last count of the drive before the turn.
+    The driver then sends a stop, and "no motion" shows that the turn is complete.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -225,11 +219,9 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 
 
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
-    """After a turn, the driver reads only the encoder, then begins the next straight move.
+    """A turn that was counted by the encoder is not added again by the next heading.
 
-    The odometry counts the turn by the encoder. The driver reads the next heading after the
-    straight move. This heading also contains the turn, but the odometry does not add the turn
-    again.
+    The driver reads this heading only after the straight move that follows.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))
@@ -262,10 +254,9 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
-    """No reply arrives for 0.3 s after a turn, so a copy of the turn may be running.
+    """A suspected copy of a turn does not end the goal if the encoder shows one complete turn.
 
-    The driver sends a stop. The encoder then shows a complete turn. A copy could not have turned as
-    far before the stop, so there was no copy, and the driver continues to the goal.
+    No reply arrives for 0.3 s after the turn, and the driver sends a stop.
     """
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot
@@ -282,10 +273,9 @@ def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware
 
 
 def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
-    """A HELLO that was sent before a move arrives during the move, ahead of a copy of the move.
+    """An answer to a HELLO sent before a move does not prove that no copy of the move runs.
 
-    The server answers HELLO before it runs the copy, so the answer does not prove that no copy
-    runs. The driver stops the copy.
+    The server answers HELLO before it runs the copy. The driver stops the copy.
     """
     bench = MartBench("source").ready()
     network, late = bench.robot.network[0], list[bytes]()
@@ -312,10 +302,7 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 
 
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
-    """During a move, a late answer to an earlier HELLO arrives. A copy of the move follows.
-
-    The answer to HELLO does not prove that no copy runs. So the driver stops the copy.
-    """
+    """A late answer to HELLO does not prove that no copy of a move runs. The copy is stopped."""
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]
 
@@ -338,10 +325,9 @@ def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
 def test_a_second_run_whose_first_reply_is_lost_makes_the_odometry_uncertain(
     goal: Pose, cut_s: float
 ) -> None:
-    """The network duplicates a move, and loses the reply to its first run.
+    """If the reply to the first run of a duplicated move is lost, the covariance includes this run.
 
-    The encoder counts only the second run, which ends by itself or is stopped. The covariance
-    includes the first run.
+    The encoder counts only the second run, which ends by itself or is stopped.
     """
     bench = MartBench("source").ready()
     to_board, from_board = bench.robot.receive, bench.robot.advance

@@ -80,8 +80,8 @@ def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
     """Without a dock, the robot drives no farther than the permitted distance.
 
-    The limit matters, because obstacles do not end a docking move. The server's moves go farther
-    than requested, so the driver requests less than the permitted distance.
+    Obstacles do not end a docking move. The driver requests less than the permitted distance,
+    because the server's moves go too far.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))
@@ -151,9 +151,9 @@ def test_a_refused_zero_command_ends_a_docking() -> None:
 
 
 def test_a_calibration_that_another_motion_prevents_names_the_other_program() -> None:
-    """The server refuses the check of the IMU before SB, because another motion is in progress.
+    """If another motion prevents a calibration, the result names another program as the cause.
 
-    The answer of the service names this reason. It does not advise to stop sending commands.
+    The server refuses the check of the IMU before SB (gyro calibration).
     """
     bench = MartBench().ready()
     real = bench.robot.receive

@@ -62,11 +62,10 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 
 
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
-    """At the end of a turn, the stop overtakes an encoder query.
+    """An encoder count that follows the stop of a turn is not used as the angle of the turn.
 
-    So the reply to the stop, which is the angle, comes before the encoder count. The count is far
-    from the expected angle. The driver does not use it as the angle, and does not learn the motors'
-    speed from it.
+    The stop has overtaken the encoder query, so the angle arrives first. The driver does not learn
+    the motors' speed from the count.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -106,10 +105,9 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """A server as in the manual refuses SSP (speed of turns) and RST IMU (check of the IMU).
+    """A copy of a refusal is not taken for the reply to the next check of the IMU.
 
-    Each refusal arrives twice. The driver does not take the copy of a refusal for the reply to the
-    next check of the IMU, so the robot drives.
+    A server as in the manual refuses SSP (speed of turns) and RST IMU (check of the IMU).
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -121,10 +119,7 @@ def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
 
 
 def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
-    """The reply to a stopped move arrives twice. The copy arrives just before the encoder count.
-
-    Both are a number. The odometry does not take the copy for the count.
-    """
+    """A copy of the reply to a stopped move is not taken for the encoder count that follows."""
     bench = on(NetworkFaults(), "firmware")
     network, pilot = bench.robot.network[0].from_board, bench.board._pilot
     real = network.send
@@ -147,13 +142,12 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
-    """The robot drives to a goal, and all replies come 0.28 s late.
+    """The goal is not discarded although all replies come 0.28 s late.
 
-    After each move, the driver sends a stop, because the network may have duplicated the request of
-    the move. A server without a duplicate has nothing to stop, and answers sooner than a server
-    that stops a second run. After such a quick answer, the driver continues to the goal.
+    The driver sends a stop after a move, because the network may have duplicated the move. A quick
+    answer to this stop excludes a second run.
 
-    ``copied``: whether the network duplicates the request. If so, the driver reports it, and adds
+    ``copied``: whether the network duplicates the move. Then the driver reports the copy, and adds
     the first run to the odometry.
     """
     bench = on(NetworkFaults(), "source")
@@ -175,11 +169,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """A late reply to a start arrives after a stop. It is not taken for the reply to the stop.
+    """A late reply to a start is not taken for the reply to the stop after it.
 
-    The driver mistakes a copy of the IMU check's ``ok`` for the reply to the start of a backward
-    drive. The true reply to this start is still on its way. The driver sends a stop, which is lost,
-    and then the true reply arrives.
+    A copy of the IMU check's ``ok`` has seemed to be the reply to the start. The stop is lost.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]
@@ -221,10 +213,9 @@ def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
 
 @pytest.mark.parametrize("reply", [b"", b"ok " + 55 * b"7" + b".00"], ids=["lost", "unreadable"])
 def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: bytes) -> None:
-    """Every reply to the heading query (RMRA) is unusable, in a drive and at rest.
+    """Unusable replies to RMRA (heading query) block neither encoder queries nor the next drive.
 
-    The driver reports that the server does not report the heading. It still reads the encoder, and
-    begins the next drive.
+    The driver reports that the server does not report the heading.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0].from_board
@@ -251,11 +242,7 @@ def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: byte
 def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
     firmware: Firmware,
 ) -> None:
-    """The robot drives a curve. From 0.5 s before the stop on, each heading query (RMRA) is lost.
-
-    The encoder shows the driver that the drive is over. The covariance of the yaw includes the turn
-    that the driver could not measure.
-    """
+    """If the last headings of a curve are lost, the covariance covers the unmeasured turn."""
     bench = on(NetworkFaults(), firmware)
     bench.command(0.3, 0.5, 2.5)
     drops(bench.robot.network[0].to_board, lambda data: data == b"RMRA")
@@ -270,8 +257,8 @@ def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
     """Change the network so that it loses some commands and duplicates the next RST IMU.
 
-    ``lost``: the network loses each command that begins with one of these words. The copy of RST
-    IMU arrives 0.29 s late. The reply to this copy is delayed by 0.29 s, too.
+    The copy and its reply are each delayed by 0.29 s. ``lost``: beginnings of the commands that are
+    lost.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
@@ -312,10 +299,9 @@ def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
 def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     firmware: Firmware, before: tuple[float, float], stops_s: float | None
 ) -> None:
-    """The command for the turn to a goal is lost. Then the late ok to an IMU check arrives.
+    """A late ok to an IMU check does not confirm a turn whose command was lost.
 
-    The driver must not take this ok for the reply to the turn command. The encoder still shows the
-    count of the previous motion, and the odometry does not add this count again.
+    The encoder still shows the count of the previous motion, which the odometry does not add again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
@@ -332,10 +318,9 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
-    """The command of a backward drive is lost. Then a late ok arrives, the reply to an IMU check.
+    """A late ok to an IMU check does not confirm a backward drive whose command was lost.
 
-    The ok looks like a reply to the command. The driver does not trust it, because the network has
-    duplicated replies a short time before. So the odometry adds no motion.
+    The driver does not trust the ok, because the network has just duplicated replies.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 3.0)

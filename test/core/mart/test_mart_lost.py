@@ -14,10 +14,9 @@ pytestmark = pytest.mark.slow
 def outlived(
     firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
 ) -> MartBench:
-    """Return a bench with a server whose stop port hangs.
+    """Return a bench with a server whose stop port hangs since the IMU died in a motion.
 
-    The IMU died in a motion, so the driver used the stop port, which has hung since then. Now the
-    IMU works again.
+    The IMU works again.
     """
     bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
     bench.command(*motion, 2.5)
@@ -44,12 +43,10 @@ def outlived(
 def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     motion: tuple[float, float], firmware: Firmware, boot_s: float, gap_s: float
 ) -> None:
-    """The IMU dies in a motion and works again later, but the server's stop port stays hung.
+    """A server with a hung stop port gets no motion until a restart, even if the IMU works again.
 
-    The driver refuses motion until the server is restarted. The network fails for a time, and
-    meanwhile the heading changes, by drift or because a user turns the robot by hand. A restart
-    would set the heading to zero. So this change does not show a restart, and the driver still
-    refuses motion.
+    A network gap and a change of the heading do not show a restart, which would set the heading to
+    zero.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -73,11 +70,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     delay_s: float, seed: int
 ) -> None:
-    """The IMU dies in a motion, so the server hangs when the driver commands a stop.
+    """A lost server is recognised, and not driven, although the network reorders its replies.
 
-    The driver uses the stop port, which then hangs too. When the IMU works again, the server
-    answers all waiting requests at once, and the network reorders the replies. The driver refuses
-    motion, even if the server's name arrives before the reply to the stop command.
+    The server hung in a stop with a dead IMU. It answers all waiting requests when the IMU works
+    again, perhaps its name before the stop.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -93,12 +89,10 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
     met: bytes, wait_s: float, delay_s: float
 ) -> None:
-    """A driver starts while the server executes RM or B with a dead IMU.
+    """A driver that starts during RM or B with a dead IMU, and hangs the server, refuses motion.
 
-    The driver sends a stop command, and the server hangs. The driver then uses the stop port, which
-    hangs, too. When the IMU works again, the driver refuses motion.
-
-    ``wait_s``: time in s from the driver's start until the IMU works again.
+    The command port and the stop port hang. ``wait_s``: time in s from the driver's start until the
+    IMU works again.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
     bench.server.receive(met, 0, None, 0.0)
@@ -117,9 +111,9 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 
 
 def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_hangs() -> None:
-    """The port is lost and opens again. The server is the same, so its stop port still hangs.
+    """After the port has opened again, a server with a hung stop port still gets no motion.
 
-    The driver still refuses motions. After a restart of the server, it accepts them.
+    After a restart of the server, the driver accepts motions.
     """
     bench = outlived("source", (0.3, 0.1))
     bench.session.closed(bench.now)
@@ -135,12 +129,10 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
-    """The server's process is stopped while the robot is at rest, and continues after 5 s.
+    """A server whose process stood still for 5 s at rest is driven again.
 
-    In these 5 s, the driver gets no replies, so it sends stop commands to the stop port. Then the
-    server answers the queries that have waited. The driver does not take these answers for the
-    reply to a stop command, which would show that the stop port may hang. So the driver accepts the
-    next command, and the robot drives.
+    The driver has sent stops to the stop port. It does not take the answers to waiting queries for
+    replies to these stops, which would show that the stop port may hang.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)
@@ -179,10 +171,9 @@ def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
 def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
     away_s: float, firmware: Firmware
 ) -> None:
-    """The robot turns about its right wheel, which rests. Only this wheel has an encoder.
+    """A robot that turns about its resting right wheel is stopped by SL and SS.
 
-    The driver finds that the server has a motion in progress. So it sends SL and SS, and repeats
-    them.
+    Only the right wheel has an encoder, but the server reports a motion in progress.
     """
     bench = met_in_a_pivot(firmware, away_s)
     assert abs(bench.robot.board.facts["yaw_rate_radps"]) > 0.5
@@ -207,10 +198,9 @@ def test_the_e_stop_stops_a_robot_while_the_driver_asks_what_moves() -> None:
 
 
 def test_the_e_stop_repeats_the_stop_of_a_lost_server_at_once() -> None:
-    """The server hangs in SRM, the stop command of a forward drive (RM).
+    """After an e-stop, the driver repeats SRM at once to a server that hangs in SRM.
 
-    The driver repeats SRM once a second. After an e-stop, it sends SRM at once, and does not wait
-    for the next repetition.
+    Without an e-stop, it repeats SRM (stop of a forward drive) once a second.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.1, 2.5)
@@ -228,10 +218,9 @@ def test_the_e_stop_repeats_the_stop_of_a_lost_server_at_once() -> None:
 def test_a_server_that_is_lost_in_a_drive_is_reported_after_one_and_a_half_seconds(
     motion: tuple[float, float],
 ) -> None:
-    """The network is cut while the robot drives.
+    """If the network is cut in a drive, the state is ``connecting`` 1.5 s after the last reply.
 
-    The driver begins to stop the robot 0.8 s later. It does not expect a busy server then, so the
-    state is ``connecting`` 1.5 s after the last reply.
+    The stop that begins 0.8 s after the cut does not delay the change of state.
     """
     bench = MartBench("source").ready()
     bench.command(*motion, 2.0)

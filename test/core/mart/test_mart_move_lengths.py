@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the moves that the driver requests on the way to a goal: how long, and how fast.
+"""Tests of the length and the speed of the moves that the driver requests on the way to a goal.
 
 The server's moves go farther than requested. The driver learns how far, and requests less.
 """
@@ -24,10 +24,9 @@ pytestmark = pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """The robot turns up to 10° farther than requested, and drives 15 % to 30 % too far.
+    """The robot reaches each goal in fewer than ``MOST_MOVES`` moves, although moves go too far.
 
-    The driver learns this and requests less. So it reaches each goal in fewer than MOST_MOVES
-    moves.
+    Turns go up to 10° too far, and drives 15 % to 30 %. The driver learns this and requests less.
     """
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
@@ -88,10 +87,7 @@ def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> Non
 
 
 def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
-    """The dock ends a move early. The driver must not learn from this that moves are short.
-
-    The next goal is behind the robot. On the way to it, the driver requests the usual distance.
-    """
+    """A docking move that the dock ends early does not make the move to the next goal longer."""
     bench = MartBench(dock_m=0.2).ready()
     assert bench.job(Job.DOCK, "DOCK", 40).success
     bench.run(2.0)
@@ -99,11 +95,10 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
-    """The server executes a straight move. Then a late copy of the command begins a second run.
+    """The driver adds the first run of a move to the odometry if it has stopped a second run.
 
-    The driver stops the second run. The encoder then shows only the distance of the second run. So
-    the driver adds the distance of the first run, which it knows from earlier moves. Then the robot
-    continues to the goal. The driver does not learn from the stopped run how far a move goes.
+    The encoder shows only the second run. The driver continues to the goal, and learns no length
+    from the stopped run.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)

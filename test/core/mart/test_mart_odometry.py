@@ -29,11 +29,10 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 
 
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
-    """Let the robot make two motions that end with equal encoder counts, and return the bench.
+    """Return a bench after two motions that end with equal encoder counts.
 
-    In each motion, no reply arrives from the start of the motion until ``quiet_s`` after the driver
-    begins to stop it. Later, the function checks again and again that the covariance covers the
-    error.
+    No reply arrives from the start of each motion until ``quiet_s`` after the beginning of its
+    stop. Afterwards, the function checks that the covariance covers the error.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -57,10 +56,10 @@ def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench
 def test_the_covariance_of_the_twist_covers_its_error(
     firmware: Firmware, twist: tuple[float, float]
 ) -> None:
-    """While the robot speeds up, the mean speed of the last counts is too low.
+    """The variances of the twist cover its error while the robot speeds up.
 
-    The variances of the twist include this error: over three drives and stops, the normalised
-    squared errors of the speed and of the turn rate are at most 1 on average.
+    The measured mean speed is then too low. The normalised squared errors of speed and turn rate
+    are at most 1 on average, over three drives.
     """
     bench = MartBench(firmware, seed=1).ready()
     chassis = bench.server.chassis
@@ -88,10 +87,9 @@ def test_the_covariance_of_the_twist_covers_its_error(
 def test_a_drive_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     speed_mps: float,
 ) -> None:
-    """Two drives end with equal encoder counts. Only the replies to their stop requests arrive.
+    """The odometry adds both of two drives that end with equal encoder counts.
 
-    The equal counts look as if the second drive had not happened. The odometry still adds both
-    drives.
+    Only the replies to their stops arrive, so the second drive could seem not to have happened.
     """
     error = after_equal_motions((speed_mps, 0.0), 0.05).error
     assert error.way_m < 0.05
@@ -114,11 +112,7 @@ def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_t
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The start request (L) of a turn is lost. A copy of an earlier ok arrives instead of a reply.
-
-    The encoder count does not change. So the driver does not conclude from this ok that the robot
-    has turned.
-    """
+    """A copy of an ok does not show a turn whose start was lost: the encoder count is unchanged."""
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(2.0)
@@ -179,11 +173,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """After a second motion, the encoder count is the same as after the first motion.
+    """If the count after a second motion equals the count before, the covariance covers two cases.
 
-    There are two possible reasons: the server never got the second start, or the second motion was
-    equal to the first one. The odometry does not know the reason. The covariance covers the error
-    in both cases.
+    The server never got the second start, or the second motion was equal to the first.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -195,10 +187,9 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
-    """A motion is commanded, and an ok seems to confirm it, but the encoder count does not change.
+    """A motion that an ok seems to confirm is not added if the encoder count does not change.
 
-    So the ok was a copy of an older reply, and the robot did not start. The odometry adds no
-    motion.
+    The ok was a copy of an older reply.
     """
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
@@ -247,10 +238,9 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 
 
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
-    """The odometry is reset during a controlled move.
+    """After a reset of the odometry during a controlled move, the covariance covers the error.
 
-    The encoder count at the end of the move contains the whole move, so it also contains the
-    distance before the reset. This makes the odometry wrong. The covariance covers the error.
+    The encoder count at the end also contains the distance before the reset.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -296,10 +286,9 @@ def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
 def test_the_covariance_includes_a_change_that_is_carried_out_twice(
     command: tuple[float, float],
 ) -> None:
-    """The robot drives backward, and the network delivers the first change of the units twice.
+    """The covariance covers the turn if the network delivers a change of the units twice.
 
-    The server changes the units twice, and answers twice. Nothing measures the turn, so the heading
-    is wrong. The second answer makes the covariance large enough for this error.
+    The robot drives backward, so nothing measures the turn. Only the second answer shows the copy.
     """
     bench = MartBench("source").ready()
     inner, first = bench.robot.receive, []

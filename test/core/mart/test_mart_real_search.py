@@ -22,14 +22,13 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(8))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """Each trial has one fault: a datagram is lost, late or doubled, or the IMU dies.
+    """One fault of a trial with two requests (``WISHES``) leaves no robot in motion.
 
-    If a datagram has the fault, the server does not hang, and the robot is at rest at the end. If
-    the IMU dies, no motion begins more than 0.25 s later. At the end, the robot is at rest, or the
-    driver has reported that it has lost the server.
+    * A datagram is lost, late or doubled: the server does not hang, and the robot rests at the end.
+    * The IMU dies: no motion begins more than 0.25 s later. At the end, the robot rests, or the
+      driver has reported that the server is lost.
 
-    In a trial, the user makes two requests (``WISHES``). The eight seeds include each fault, and
-    each kind of request as the first one.
+    The eight seeds include each fault, and each kind of request as the first one.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))
@@ -49,10 +48,9 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during a forward drive. The interrupted network loses the first stops.
+    """After SL (stop port), the driver does not send SRM, the usual stop of a forward drive.
 
-    The first stop that arrives is SL (stop port). After SL, the driver does not send SRM, the usual
-    stop of a forward drive: SRM would hang the server.
+    SRM would then hang the server. The network has lost the first stops of the driver.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""

@@ -10,10 +10,9 @@ from omnibot_driver.core.errors import ParameterError
 
 @pytest.mark.parametrize("port", ["replay://field", "REPLAY://field?speed=10"])
 def test_a_recording_is_refused_with_what_to_do_instead(port: str) -> None:
-    """A user gives a recording as the port of a MART controller.
+    """A recording is refused as the port of a MART controller.
 
-    The odometry depends on the driver's requests, which a replay does not send again. So the port
-    is refused, and the message names two other uses of the bag.
+    A replay does not repeat the driver's requests. The message names two other uses of the bag.
     """
     with pytest.raises(ParameterError) as refusal:
         boards.check_all({"board": "mart", "port": port})

@@ -125,10 +125,9 @@ def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Firmware) -> None:
-    """A server is restarted during a move. The robot still moves, and the IMU is dead.
+    """If the IMU is dead after a restart in a move, MCS switches the motors off, without a turn.
 
-    The driver stops the robot with MCS, which writes to the motors and needs no IMU. It starts no
-    turn.
+    MCS needs no IMU.
     """
     bench = rescued(firmware, alive=False)
     assert bench.robot.stands
@@ -137,11 +136,7 @@ def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Fi
 
 
 def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree() -> None:
-    """A server restarts during a move, and the robot still moves.
-
-    As in the manual, the server has no direct control of the motors (MCS). So the driver stops the
-    robot by a controlled turn of one degree.
-    """
+    """If a restarted server has no MCS, the driver ends the motion by a turn of one degree."""
     bench = rescued("documented", alive=True)
     assert bench.robot.stands
     assert b"MCR SLOW 1" in bench.said()
@@ -175,10 +170,9 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_odometry_goes_on_if_the_server_is_restarted_while_the_robot_drives(
     boot_s: float, motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The server restarts during a drive. It then answers the driver's stop with "no motion".
+    """A restart during a drive does not undo the drive: the odometry adds it once.
 
-    The driver does not conclude from this answer that the drive never started. It adds the drive to
-    the pose, and adds it only once.
+    The restarted server answers the stop with "no motion", as if the drive had never started.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 3.0)
@@ -201,9 +195,9 @@ def test_odometry_goes_on_if_the_server_is_restarted_while_the_robot_drives(
 def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The controller loses its power for a second. Its count and heading begin at zero again.
+    """If the controller loses its power for a second in a drive, the pose does not jump back.
 
-    The driver does not take this for a drive back to the start, so the pose does not jump.
+    The count and the heading begin at zero.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 4.0)
@@ -230,11 +224,9 @@ def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
 def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
     boot_s: float, motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The server restarts in a curve. The motors keep their last command for some seconds.
+    """After a restart in a curve, the covariance covers an error of the yaw of up to 80°.
 
-    After the restart, the server's relative heading begins at zero. So the driver does not learn
-    how far the robot has turned meanwhile. ``odom`` is wrong by up to 80°, and the covariance
-    includes this error.
+    The motors keep running for some seconds, and the server's heading begins at zero.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)
@@ -250,10 +242,9 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
     offset_s: float,
 ) -> None:
-    """Another server answers at the controller's address. Then the controller is started there.
+    """A controller that replaces another server at its address is not crashed while it starts up.
 
-    The address is never silent, so no silence shows the change. Still, the driver sends nothing
-    that would crash the controller's server while it starts up.
+    The address is never silent, so no silence shows the change.
     """
     bench = MartBench("source").ready()
     seconds = 8.0 + offset_s
@@ -278,12 +269,10 @@ def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
 def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_loses_datagrams(
     boot_s: float, seed: int, speed: float, yaw_rate: float
 ) -> None:
-    """The server restarts during a drive, and the motors keep running.
+    """The driver switches running motors off with MCS soon after a restart, without waiting.
 
-    The network loses and duplicates datagrams. The restarted server knows of no motion, so the
-    driver's stops have no effect. The driver then switches the motors off with MCS. It usually
-    waits before that until the robot has rolled out. Here the motors still run, so it sends MCS
-    at once.
+    The restarted server knows of no motion, so stops have no effect. The network loses and
+    duplicates datagrams.
     """
     faults = NetworkFaults(lose=0.05, duplicate=0.05, delay_s=0.05)
     bench = MartBench(faults=faults, seed=seed).ready()
@@ -316,10 +305,9 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """The server restarts in a drive, and the motors run on. It has no MCS, and the network is bad.
+    """On a bad network, a restarted server without MCS is stopped by a turn of one degree.
 
-    The encoder counts that show the motion may come long after the stops, which find no motion. The
-    driver then still stops the robot, by a turn of 1 degree.
+    The counts that show the motion may come long after the stops, which find no motion.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()
@@ -341,10 +329,9 @@ def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: 
 def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarted(
     firmware: Firmware, motion: tuple[float, float]
 ) -> None:
-    """The server restarts in a drive within 0.1 s, and the motors keep running.
+    """After an e-stop, MCS switches the motors off at once, although the server has just restarted.
 
-    The server answers the stop with "no motion", because it has forgotten the drive. The driver
-    then switches the motors off with MCS at once, while the server still starts up.
+    The server answers the usual stop with "no motion".
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -361,11 +348,10 @@ def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarte
 @pytest.mark.parametrize("boot_s", [0.05, 0.4])
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot_s: float) -> None:
-    """The server restarts quickly in B, and the motors keep running.
+    """A quick restart in B (backward drive) is noticed, and the driver begins the drive anew.
 
-    The server no longer stops the robot in front of an obstacle. The encoder does not show the
-    restart. The driver sends ``CS 0 0`` once a second; the server refuses it, and the driver begins
-    the drive anew.
+    A restarted server no longer stops the robot at an obstacle. It refuses ``CS 0 0``, which the
+    driver sends once a second.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 4.0)
@@ -382,10 +368,9 @@ def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot
 def test_a_quick_restart_at_rest_is_noticed_before_the_next_motion(
     boot_s: float, wait_s: float
 ) -> None:
-    """The server restarts at rest in less than 0.5 s, which is not regarded as an absence.
+    """A restart at rest of less than 0.5 s is noticed before the next motion.
 
-    After each short silence, the driver waits for the heading before it begins a motion. The
-    heading is zero after a restart. So the driver waits until the server has started up.
+    After each short silence, the driver waits for the heading, which is zero after a restart.
     """
     bench = MartBench("source").ready()
     bench.command(0.2, 0.3, 1.5)

@@ -44,9 +44,8 @@ KINDS: Final = {
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
     """The search finds no failure: the server does not hang, and the robot can be stopped.
 
-    The search tries all cases in which up to two copies and one reply are late. In each case, the
-    IMU may die at any step. After the IMU has died, or after the driver has given up, only a crash
-    of the server counts as a failure.
+    Up to two copies and one reply are late, and the IMU may die at any step. With a dead IMU, or
+    after the driver has given up, only a crash of the server is a failure.
     """
     found = search()
     assert found.bad == ()
@@ -95,11 +94,9 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The test changes the modelled driver, so that it sends SRM, a stop, directly after SL.
+    """The search finds that a driver which sends SRM, a stop, directly after SL hangs the server.
 
-    SRM can hang the server at that time. The real driver avoids this: before it sends SRM, it sends
-    queries that show whether a motion continues. The search finds that the changed driver hangs the
-    server.
+    The real driver first queries whether a motion continues.
     """
 
     def sweeps(world: World) -> model.Step:
@@ -147,8 +144,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    While the command port is silent, neither the motion nor the reason for the silence (``port``)
-    can be observed. The function then sets the motion, ``port`` and ``released`` to fixed values.
+    While the command port is silent, the motion, ``port`` and ``released`` cannot be observed, and
+    are set to fixed values.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
@@ -159,11 +156,9 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    All commands are compared, with two exceptions:
-
-    - A busy server executes only the commands on its stop port (SL and SS). So for a busy server,
-      only SL and SS are compared.
-    - After the stop port has stopped a motion (``released``), ``L`` is not compared.
+    * Busy server: only SL and SS are compared, because it executes only its stop port's commands.
+    * After the stop port has stopped a motion (``released``): all commands except ``L`` are
+      compared.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

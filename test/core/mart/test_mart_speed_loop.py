@@ -38,11 +38,10 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """If a motor is faster than the driver expects, the driver must not expect less afterwards.
+    """The true speed of a faster motor, measured at 14 units, does not lower the learnt line there.
 
-    The driver first measures the true speed at 18 units, and a speed that is too low at 26 units.
-    The learnt line cannot have a positive speed at zero units, so its speed at 14 units is then too
-    low as well. The measurement of the true speed at 14 units must not lower the line there.
+    A speed at 26 units that was measured too low has lowered the line before, because the line has
+    no positive speed at zero units.
     """
     line = MotorLine()
     for _ in range(8):
@@ -96,10 +95,7 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """The robot drives for a long time at one speed. Each measurement of this speed has noise.
-
-    The driver learns from these measurements. They change the units for another speed by at most 3.
-    """
+    """Noise in a long drive at one speed changes the units for another speed by at most 3."""
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
         line.learn(units, slope * max(0.0, units - dead))
@@ -125,11 +121,9 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """If a start does not move the robot, the next start uses three times as many motor units.
+    """After a start that moves nothing, the next start uses three times the units, up to 20.
 
-    The increase ends at 20 units, because 20 units move every robot that is not blocked. So a start
-    with 30 units that does not move the robot raises nothing: the next start still has at least 20,
-    but fewer than 30 units.
+    20 units move every robot that is not blocked.
     """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4
@@ -150,10 +144,7 @@ CHANGES = st.lists(
 def test_unanswered_changes_are_judged_by_the_measured_speeds(
     changes: list[tuple[int, int, bool]],
 ) -> None:
-    """Some changes of the motors' units are not answered. Each of them may be lost or not.
-
-    From the measured speeds of the wheels, the driver finds out which changes have arrived.
-    """
+    """The measured speeds show which unanswered changes of the motors' units have arrived."""
     settings = MartSettings()
     loop, now = SpeedLoop(settings), 0.0
     loop.begin(50, False, now)
@@ -171,10 +162,9 @@ def test_unanswered_changes_are_judged_by_the_measured_speeds(
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A speed change acts twice if the network duplicates its request.
+    """The driver assumes at most 8 % difference between the motors, whatever it measures.
 
-    This looks as if the motors were unequal. So the driver assumes at most 8 % difference between
-    the motors, whatever it measures.
+    A change of speed that the network duplicates looks like unequal motors.
     """
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)
@@ -188,11 +178,10 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """The network may duplicate the request of a speed change. The change then acts twice.
+    """A change of speed is at most 15 units in a forward drive, and 5 in a backward drive.
 
-    Only the heading can show that a change has acted twice, and in a backward drive, the heading
-    may be unknown. So the driver limits each change: to 15 units in a forward drive, and, on a slow
-    network as in this test, to 5 units in a backward drive.
+    The network may duplicate a change, and in a backward drive the heading may not show this. The
+    lower limit is for a slow network.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

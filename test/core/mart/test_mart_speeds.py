@@ -92,9 +92,9 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
 
 
 def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
-    """Something slows the robot's first turn by 10 % for 0.6 s, four seconds after the command.
+    """A turn that is 10 % too slow for 0.6 s, four seconds after its command, is continued.
 
-    The driver continues the turn, because a new start would cost more than this error.
+    A new start would cost more than this error.
     """
     bench = MartBench("source", speed_mps_per_unit=MartSettings().speed_per_unit).ready()
     bench.command(0.0, 0.5, 4.0)
@@ -110,9 +110,8 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """Something, such as a door sill, slows a turn for about a second. Then the turn is free again.
+    """After something has slowed a turn of 0.5 rad/s, the robot turns at less than 0.9 rad/s.
 
-    From then on, the robot may turn faster than the commanded 0.5 rad/s, but slower than 0.9 rad/s.
     If the driver has learned from an earlier turn, the robot stays below 0.6 rad/s.
     """
     bench = MartBench("source").ready()
@@ -135,11 +134,10 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
-    """The driver does not learn the balance of the motors from a turn on the spot.
+    """A turn on the spot does not change the balance of the motors.
 
-    Such a turn shows only the mean speed of the two motors. Here, the user has set the right
-    balance (``motor_balance``). After turns on the spot, a drive straight backward is still
-    straight.
+    The turn shows only their mean speed. With the balance set by the user (``motor_balance``), a
+    later drive backward is straight.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(
@@ -156,9 +154,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Motor units are whole numbers, so slow turns on the spot are up to 17 % too fast.
+    """Slow turns, up to 17 % too fast, do not change the balance that was learned from a drive.
 
-    These turns do not change the balance of the motors that the driver has learned from a drive.
+    Motor units are whole numbers.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
@@ -229,10 +227,9 @@ def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
-    """The first drive is a curve backward. The user has set the balance of the motors.
+    """With the user's motor balance, even a first curve backward has the commanded turn rate.
 
-    In this curve the server reports no heading, so the driver cannot measure the balance. It uses
-    the user's value, and the turn rate is as commanded.
+    In this curve the server reports no heading, so the balance cannot be measured.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench("source", settings=settings, motor_inequality=unequal).ready()
@@ -265,10 +262,9 @@ def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> N
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
-    """The commanded rate of a turn falls slowly, in many small steps.
+    """If the rate of a turn falls slowly, the turn is not begun anew at each step.
 
-    The driver does not begin the turn anew at each step. It does so only after the commanded rate
-    has been constant for a while.
+    A new start waits until the rate has been constant for a while.
     """
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):

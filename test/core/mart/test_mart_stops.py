@@ -43,10 +43,9 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """An e-stop comes while the driver starts a motion.
+    """An e-stop in the middle of a start leaves the robot at rest.
 
-    The e-stop comes during the check of the IMU, or before the server has answered the command that
-    starts the motion. The robot is at rest, and stays at rest.
+    The e-stop comes during the check of the IMU, or before the answer to the start.
     """
     bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
@@ -76,9 +75,9 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
 def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
     faults: NetworkFaults, seed: int
 ) -> None:
-    """On a bad network, the driver executes several motions in a row. Then it shuts down.
+    """On a bad network, the robot is at rest within 3 s after the shutdown begins.
 
-    The robot is at rest within 3 s after the shutdown began, and the server does not hang.
+    Several motions precede the shutdown, and the server does not hang.
     """
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
@@ -113,10 +112,9 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """The network delivers the command of a controlled move twice. The second copy comes late.
+    """A second run of a controlled move, by a late copy, is stopped within 1 s by the e-stop.
 
-    When the first move has ended, the server executes the late copy, without a reply. So the robot
-    makes a second move. The user latches the e-stop, and the robot is at rest within 1 s.
+    The server does not answer the copy.
     """
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
@@ -133,11 +131,7 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
 def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Two replies come in the wrong order: first the answer to HELLO, then the reply of a move.
-
-    The driver does not take the answer to HELLO for the end of the move. The move ends when its own
-    reply arrives.
-    """
+    """An answer to HELLO that comes before the reply of a move does not end the move."""
     bench = MartBench().ready()
     receive = bench.session.inbound.receive
     late: list[bytes] = []
@@ -163,10 +157,9 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The driver stops a turn, but the stop is lost. A reply to the stop would contain an angle.
+    """A late encoder count is not taken for the reply to the lost stop of a turn.
 
-    Instead of this reply, the late reply to an earlier query of the encoder arrives. It contains a
-    number that could be an angle. The driver does not take it for the reply to the stop.
+    The reply would contain an angle, and the count could be one.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
@@ -223,10 +216,9 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
     firmware: Firmware,
 ) -> None:
-    """One motion follows another. The robot reaches the speed of the new motion within 1.5 s.
+    """On a good network, the robot has the speed of the next motion within 1.5 s.
 
-    Between the two motions, the driver may send the stop again. The server answers the second stop
-    with "no motion". The driver does not take this answer for a sign of a restart.
+    A second stop may be answered with "no motion", which is not taken for a sign of a restart.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)
@@ -264,10 +256,9 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """The driver waits before it uses the stop port. It waits longer than the network delay.
+    """The driver waits longer than the network delay from the last usual stop to the stop port.
 
-    The wait begins with the last usual stop (SM or SRM). If a command to the stop port came
-    directly after a usual stop, the server could hang.
+    A command to the stop port directly after SM or SRM could hang the server.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)

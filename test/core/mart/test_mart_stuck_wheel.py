@@ -2,8 +2,7 @@
 
 """Tests of a wheel that is stuck in a turn, in a drive or in a controlled move.
 
-The controller reports the encoder count of the right wheel only. It measures the angle of a turn by
-the gyro.
+The controller counts only the right wheel, and measures the angle of a turn by the gyro.
 """
 
 import math
@@ -25,10 +24,10 @@ MOST_NEES = 16.3
 def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
     stuck: Stuck, first_s: float
 ) -> None:
-    """A wheel gets stuck during a turn to a goal. The server measures the turn only by the gyro.
+    """If a wheel gets stuck in a turn to a goal, the driver discards the goal.
 
-    The encoder of the right wheel shows another angle than the gyro, so the driver discards the
-    goal. The covariance of the pose covers the difference between the two angles.
+    The encoder of the right wheel and the gyro show different angles. The covariance covers the
+    difference.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 0.0, 2.6)
@@ -45,10 +44,9 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 
 @pytest.mark.parametrize("first_s", [0.0, 2.0])
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
-    """The left wheel is stuck in a turn, so the right wheel turns twice as far for the same angle.
+    """A left wheel that is stuck in a turn is reported, and the covariance covers the error.
 
-    The server's reply to the stop contains the true angle. The driver computes another angle from
-    the right wheel. It reports the difference between the two angles, and the covariance covers it.
+    The angle in the reply to the stop differs from the angle by the right wheel's encoder.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)
@@ -64,10 +62,9 @@ def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> Non
 def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
     vx: float, yaw_rate: float
 ) -> None:
-    """The right wheel is stuck. At each start, only the left wheel turns, and the start fails.
+    """After three failed starts, a motion with a stuck right wheel is refused.
 
-    After three starts, the driver refuses this motion until the user's command ends. When the wheel
-    is free, a new command moves the robot again.
+    The refusal lasts until the command ends. A new command moves the robot when the wheel is free.
     """
     bench = MartBench("source").ready()
     bench.server.chassis.change(stuck="right")
@@ -88,11 +85,7 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
 def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
     vx: float, first_s: float
 ) -> None:
-    """The right wheel gets stuck in a drive, so the left wheel turns the robot.
-
-    This turn ends when the driver notices that a wheel is stuck. The driver cannot measure the
-    whole turn, so the covariance must cover the error of the pose.
-    """
+    """If the right wheel gets stuck in a drive, the covariance covers the unmeasured turn."""
     bench = MartBench("source").ready()
     bench.command(vx, 0.0, first_s)
     bench.server.chassis.change(stuck="right")
@@ -108,9 +101,9 @@ def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
 def test_a_wheel_that_gets_stuck_in_a_straight_move_makes_the_heading_uncertain(
     stuck: Stuck, x_m: float, first_s: float
 ) -> None:
-    """A wheel gets stuck in a straight move, so the robot turns. The server reports only a failure.
+    """If a wheel gets stuck in a straight move, the covariance covers the unknown turn.
 
-    The driver does not know how far the robot has turned. The covariance covers the error.
+    The server reports only a failure.
     """
     bench = MartBench("source").ready()
     bench.go_to(x_m, 0.0, 0.0)

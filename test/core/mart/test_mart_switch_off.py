@@ -2,9 +2,8 @@
 
 """Tests that no motor stays on after a straight move.
 
-When the move ends, the public server switches both motors off. In the same control step it may
-correct the heading once more. This correction gives one motor a small speed again. So the driver
-sends MCS, which writes "stop" to both motors, and then MSM, which ends the direct control.
+The public server may leave one motor on, by a last correction of the heading. So the driver sends
+MCS, which stops both motors, and then MSM, which ends the direct control.
 """
 
 from collections.abc import Callable
@@ -50,9 +49,9 @@ def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
 
 
 def test_a_motor_that_the_server_has_left_on_is_switched_off() -> None:
-    """After a straight move, the server has left a motor on. The driver sends MCS, then MSM.
+    """MCS switches off a motor that the server has left on, and MSM follows.
 
-    MCS switches both motors off. MSM follows when no late copy of MCS can arrive any more.
+    MSM waits until no late copy of MCS can arrive.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -85,10 +84,9 @@ def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
 
 
 def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
-    """The reply to MCS (direct control of the motors) is lost. The server refuses the repeated MCS.
+    """A repeated MCS (direct control of the motors) that the server refuses is followed by MSM.
 
-    The refusal shows that the first MCS has arrived. So the driver sends MSM, which ends the direct
-    control.
+    The refusal shows that the first MCS has arrived. MSM ends the direct control.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -104,11 +102,9 @@ def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None
 
 
 def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
-    """The driver can start a motion although a late copy of MCS has blocked the server.
+    """A late copy of MCS does not prevent the next drive.
 
-    MCS switches the motors off. Its copy arrives 0.29 s late, while the user commands a drive. The
-    server then refuses motions until it receives MSM. So the driver sends MSM, and the drive
-    begins.
+    The server refuses motions after the copy, until the driver sends MSM.
     """
     bench = creeping()
     since = len(bench.written)
@@ -128,9 +124,8 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
     """The driver sends MSM only when no late copy of MCS can arrive any more.
 
-    MCS begins the direct control of the motors, and MSM ends it. A copy of MCS after MSM would
-    begin the direct control again. Here, the reply to the first MCS is lost, so the driver repeats
-    MCS, and the network delivers a late copy of the second one.
+    A copy of MCS after MSM would begin the direct control of the motors again. MCS was repeated
+    here, because its first reply was lost.
     """
     bench = creeping()
     since = len(bench.written)
@@ -149,7 +144,7 @@ def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
 def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
     """The driver sends no MCS (switch off the motors) if a controlled turn follows a straight move.
 
-    The turn sets the speeds of both motors, and switches them off at its end.
+    The turn switches both motors off at its end.
     """
     bench = MartBench("source").ready()
     since = len(bench.written)
@@ -167,11 +162,7 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
 def test_a_motion_that_never_began_does_not_replace_a_switch_off(
     word: bytes, twist: tuple[float, float]
 ) -> None:
-    """If the start of a motion is lost, the driver still switches off a motor that is left on.
-
-    A straight move has left a motor on. The next motion would set this motor anew, but its start
-    does not reach the server. After the user's stop, the driver switches the motor off.
-    """
+    """If the start of the next motion is lost, the driver switches off a motor that is left on."""
     bench = creeping()
     lost = drops(bench.robot.network[0].to_board, lambda data: data.startswith(word))
     bench.command(*twist, 1.2)
@@ -186,8 +177,7 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
 def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply: bytes) -> None:
     """If a server gives no valid answer to MCS and MSM, the driver still starts motions.
 
-    The server answers with a text of its own, or not at all. The driver tries a few times, and
-    reports once that there is no answer.
+    After a few attempts, one notice reports the missing answer.
     """
     bench = MartBench("documented")
     network = bench.robot.network[0]
@@ -209,8 +199,8 @@ def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply:
 def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
     """The driver ends the direct control of the motors even if MCS seemed to be unknown.
 
-    A late reply to another command says "not supported", and seems to be the reply to MCS. In fact,
-    the server has obeyed MCS, so it refuses the next motion. Then the driver sends MSM.
+    A late "not supported" has seemed to be the reply to MCS. MSM follows when the server refuses
+    the next motion.
     """
     bench = creeping()
     network = bench.robot.network[0]
@@ -275,8 +265,7 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 def test_a_server_without_these_commands_is_asked_once() -> None:
     """If a server does not know MCS (switch off the motors), the driver sends MCS only once.
 
-    The driver usually sends MCS after each straight move. A server that follows the manual does not
-    know it. Here, the robot makes two moves. MCS is sent only after the first.
+    The robot makes two straight moves.
     """
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):
@@ -301,10 +290,9 @@ def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None
 def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
     away_s: float,
 ) -> None:
-    """A new driver ends the direct control of the motors (MCS) that an earlier driver has left on.
+    """A new driver sends MSM to end the direct control (MCS) that an earlier driver has left on.
 
-    It sends MSM, and then the robot drives. This also works if the network fails at first. In that
-    case, the new driver also uses the stop port.
+    The robot then drives, even if the network fails at first, and the driver uses the stop port.
     """
     bench = MartBench("source")
     bench.server.receive(BOTH[0], 0, None, 0.0)
@@ -339,12 +327,11 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 
 
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
-    """The driver does not take a second copy of the reply to MSM for the reply to RST IMU.
+    """A second copy of the reply to MSM is not taken for the reply to RST IMU (check of the IMU).
 
-    The stop port has ended a forward drive, and SRM (a stop) would hang the server. The driver
-    sends MSM, then RST IMU (check of the IMU). An ``ok`` to RST IMU would show that SRM is safe
-    again. RST IMU is lost, but the ``ok`` to MSM arrives twice. The driver does not send SRM. It
-    gives a notice: the server still reports a motion although the robot is at rest.
+    An ``ok`` to RST IMU would show that SRM (a stop) is safe, but SRM would hang the server after
+    the stop port. The driver gives a notice: the server reports a motion although the robot is at
+    rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)
