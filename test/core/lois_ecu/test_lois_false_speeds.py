@@ -71,7 +71,7 @@ def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
 ) -> None:
     """The odometry does not follow the far too high first speed that is reported at a start.
 
-    The board measures speed between two ticks, and its timer wraps while a wheel is at rest.
+    The board measures the pause before the first tick wrongly, because its timer wraps.
     """
     reports = Reports()
     reports.order(-12, 12)
@@ -87,8 +87,7 @@ def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
 def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
     """Odometry does not move a resting wheel by a turn that the board computes from an old speed.
 
-    The board still holds 11 RPM for the left wheel, and turns its heading accordingly at the first
-    tick of the right wheel.
+    The board still holds 11 RPM for the left wheel when the right wheel starts.
     """
     reports = Reports()
     reports.order(-12, 12)

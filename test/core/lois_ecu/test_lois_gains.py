@@ -69,7 +69,7 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
     """All settings reach the board, although a busy computer sends each round without a pause.
 
-    The board receives nothing while it sends a date. Only the last line of a round requests a date.
+    Only the last line requests a date: the board receives nothing while it sends a date.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
@@ -108,8 +108,8 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
     """A setting follows a Stop by at least 15 ms, unless the driver is called too seldom.
 
-    Bug: the low-pass followed the first Stop at once. After a loss of fourteen characters, the
-    board could obey the rest of both lines: full duty for one wheel.
+    Bug: the low-pass followed the first Stop at once. If fourteen characters were lost, the rest of
+    both lines could command full duty.
     """
     points = SetPoints(HOST_GAINS)
     writer = SettingsWriter(HOST_GAINS, points)
@@ -130,9 +130,9 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
 def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
     """A setting that waited for the end of a drive is sent at least 15 ms after the Stop.
 
-    If the driver is called too seldom, the setting is sent half a second after the Stop.
+    If the driver is called too seldom, it sends the setting half a second after the Stop.
 
-    Bug: if the setting had waited for more than half a second, it followed the Stop at once.
+    Bug: a setting that had waited for more than half a second followed the Stop at once.
     """
     settings = LoisEcuSettings()
     points = SetPoints(settings)
@@ -157,7 +157,7 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
     """A Stop in the other form of lines is never in the same write as a setting.
 
-    The beginning of this Stop and the end of a setting could command full duty.
+    The two lines could otherwise lose characters and command full duty.
     """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)

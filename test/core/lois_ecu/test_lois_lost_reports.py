@@ -75,8 +75,7 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
     """A gap below 1 s in a steady drive adds less than 10° to the heading's standard deviation.
 
-    The error of the heading is below 10° too, in each phase of the board's timers. After a longer
-    gap, the board might have restarted.
+    The heading's error is below 10° too. In a longer gap, the board could restart unseen.
     """
     for phase in range(8):
         rig = Rig(nominal("firmware"), HOST_GAINS)

@@ -18,11 +18,11 @@ GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
 @pytest.mark.slow
 @FIRMWARE
 def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: str) -> None:
-    """The driver gives each reason for a refusal only while this reason is true.
+    """Each reason for a refusal is given only while it is true.
 
     * Before a terminal mode is written: the mode is changing.
     * In the mode: the mode itself.
-    * After the user has ended the mode: the board has not left the mode yet.
+    * After the user has ended the mode: the board has not left it yet.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -53,8 +53,8 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
     """Refusals say that the terminal mode is still changing in two cases.
 
-    * The robot is at rest, but the settings must be written before the mode.
-    * The mode is written, but messages of the normal mode still arrive.
+    * The robot is at rest, but the settings are not written yet.
+    * The mode is written, but messages of the normal mode arrive.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)

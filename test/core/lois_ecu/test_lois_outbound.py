@@ -103,8 +103,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
     """A lost run of fourteen characters can join a Stop and the low-pass after it to full duty.
 
-    The driver therefore sends a setting at least 15 ms after a set-point. The other order does no
-    harm.
+    The driver therefore leaves at least 15 ms between them. The other order does no harm.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
@@ -120,8 +119,7 @@ def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_
 ) -> None:
     """A lost run as long as one line can join a motion line and an LED line to a wrong motion line.
 
-    The driver therefore sends an LED line at least 15 ms after a motion line. The other order does
-    no harm.
+    The driver therefore leaves at least 15 ms between them. The other order does no harm.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

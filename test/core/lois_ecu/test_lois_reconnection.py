@@ -100,10 +100,9 @@ def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_m
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """After a silence, the board's clock shows why the tick counts are at zero.
+    """If tick counts are zero after a silence, the clock shows whether the board has restarted.
 
-    * The clock has continued: the wheels have rolled back.
-    * The clock is near zero too: the board has restarted.
+    Otherwise, the wheels have rolled back.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

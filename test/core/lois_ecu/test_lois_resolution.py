@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of tick counts with encoders of few and of many ticks per turn (the resolution).
-
-With each resolution, the driver accepts every motion of a wheel, and notices errors and restarts.
-"""
+"""Tests of tick counts with encoders of few and of many ticks per turn (the resolution)."""
 
 import math
 from dataclasses import replace
@@ -103,7 +100,7 @@ def test_wheels_that_roll_back_are_no_restart(
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
     """The distance of a drive out and back is right within two ticks or 0.03 m, the larger of both.
 
-    The driver takes no falling count for a restart. It notices the real restart at the end.
+    Only the real restart at the end is taken for a restart.
     """
     ours = LoisEcuSettings(ticks_per_revolution=per_turn)
     translation, odometry = Translation(ours), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -184,8 +181,7 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
     """A new resolution applies to the proof of a reset that is already in progress.
 
-    After the reset, a wheel rolls 250 ticks: a quarter turn by the new resolution, but more than
-    four turns by the old one.
+    After the reset, a wheel rolls 250 ticks: a quarter turn by the new resolution.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

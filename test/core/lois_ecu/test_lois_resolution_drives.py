@@ -52,8 +52,8 @@ def test_a_robot_with_such_encoders_drives_out_and_back(
 ) -> None:
     """With few or many encoder ticks, the odometry is right after a drive out and back.
 
-    * Error: at most 0.1 m or 3 sigma.
-    * The driver rejects no report, and notices only the real restart at the end.
+    The error is at most 0.1 m or 3 sigma. No report is rejected, and only a real restart is
+    noticed.
     """
     settings = LoisEcuSettings(ticks_per_revolution=per_turn, drive_mode=mode)
     bench = Bench(firmware, settings, steps=per_turn)
@@ -79,8 +79,8 @@ def test_a_robot_with_such_encoders_drives_out_and_back(
 def test_a_new_resolution_applies_while_the_driver_runs() -> None:
     """A new ``ticks_per_revolution`` applies at once, and ends the rejection of reports.
 
-    The encoders have 1000 ticks per turn. With the old value of 60, the counts of a fast wheel are
-    implausible, and a notice names the parameter.
+    With the wrong value, the counts of a fast wheel are implausible, and a notice names the
+    parameter.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=60), steps=1000)
     bench.drive_on(0.65, 3.0)
@@ -117,7 +117,7 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """A wrap of the board's clock is not taken for a restart, even if the counts are near zero.
+    """A wrap of the board's clock near counts of zero is not taken for a restart.
 
     The robot has driven back to its start, and a read is late.
     """

@@ -2,7 +2,8 @@
 
 """Tests of restarts that are hard to see, on a board that follows the manual.
 
-The board's clock counts ns and wraps every 4.3 s. Clock and tick counts are zero after a restart.
+The board's clock counts ns and wraps every 4.3 s. After a restart, clock and tick counts begin at
+zero.
 """
 
 import math
@@ -123,8 +124,7 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
     """Wheels that roll back until clock and counts are near zero are not taken for a restart.
 
-    ``late_s``: delay in s of a read at this time. With a delay, the clock does not fit the arrival
-    times.
+    ``late_s``: delay in s of a read at this time.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6
@@ -181,8 +181,8 @@ def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
 def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
     """Wheels that roll back at 150 RPM, in duty mode, are not taken for a restart.
 
-    Bug: counts that decreased at more than 110 RPM showed a restart in each report. The heading
-    went wrong by radians, and commands were discarded.
+    Bug: counts that decreased at more than 110 RPM showed a restart. The heading went wrong by
+    radians, and commands were discarded.
     """
     slow = [(-FAST_TICKS // 2, right // 2)]
     translation = fast_wheels(slow + [(-FAST_TICKS, right)] * 22)

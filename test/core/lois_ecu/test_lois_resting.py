@@ -43,7 +43,7 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
     """After a fall to 28 RPM, many repetitions prove that the wheel is at rest.
 
-    No rolling wheel is that steady. The value of 28 RPM is wrong: the board noticed a tick late.
+    No rolling wheel is that steady.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -89,7 +89,7 @@ def test_another_speed_ends_the_rest() -> None:
 def test_a_fall_that_was_not_told_is_seen() -> None:
     """A fall from the estimated 28 RPM to reports of 14 RPM shows that the wheel is at rest.
 
-    The board does not report a speed while both wheels have the same speed.
+    The board reports no speed while both wheels have the same speed.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -111,7 +111,7 @@ def test_a_fall_in_gaps_between_reports_is_seen() -> None:
 def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
     """If most reports are lost, a fall of only 6 RPM shows that the wheel is probably at rest.
 
-    The true fall may have been larger, because it may have begun in a gap.
+    The fall may have begun in a gap.
     """
     assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
     assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
@@ -121,7 +121,7 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """If most reports are lost, many equal reports prove that a wheel rests, even without a fall.
 
-    The speed may have fallen in a gap. Without gaps, the same reports show that the wheel rolls.
+    The speed may have fallen in a gap.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

@@ -141,8 +141,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 def test_a_reset_is_not_repeated_after_the_answer_that_it_failed() -> None:
     """After the answer that a reset failed, the driver does not send the reset again.
 
-    The driver sends it two to eight times before this answer. A new request succeeds when the wire
-    is repaired.
+    When the wire is repaired, a new request succeeds.
     """
     bench = Bench("documented")
     bench.drive_on(0.2, 1.2)
@@ -299,8 +298,6 @@ def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
 def test_counts_that_arrive_after_a_reset_move_no_odometry(firmware: str, stall_s: float) -> None:
     """A reset does not move the odometry if older tick counts arrive after the request.
 
-    The driver does not conclude from the fall to 0 that the board counts backward.
-
     ``stall_s``: length in s of a stall just before the reset, in which the driver reads nothing.
     """
     bench = Bench(firmware, HOST_GAINS)
@@ -350,7 +347,7 @@ def test_a_new_request_for_the_led_replaces_the_one_before() -> None:
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped(firmware: str) -> None:
     """After four displacements in a row faster than ``fastest_linear_speed``, the robot is stopped.
 
-    After a single one it is not, because the board may have corrected its odometry.
+    A single such displacement may come from a correction of the board's odometry.
     """
     bench = Bench(firmware)
     bench.session.configure(replace(SETTINGS, motion=MotionLimits(fastest_mps=0.6)), bench.now)

@@ -136,11 +136,7 @@ def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> 
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """Two wheels that roll steadily do not look stalled.
-
-    Each is at its set-point, or the left one is 10 % too fast. Speeds are reported in whole RPM, so
-    the same value comes several times.
-    """
+    """Two wheels that roll steadily, at the set-point or 10 % faster, do not look stalled."""
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
 
@@ -157,7 +153,7 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
     """A wheel that the odometry assumes to be at rest looks stalled just above its set-point.
 
-    The speed controller gives no power at this reported speed, so the wheel does not start.
+    At this reported speed, the speed controller gives no power.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -167,7 +163,7 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
     """A wheel at rest whose last reported speed is below its set-point does not look stalled.
 
-    The speed controller uses this old speed and gives power, so the wheel starts by itself.
+    By this speed, the controller gives power, and the wheel starts by itself.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -200,8 +196,8 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     * For a wheel at rest, the driver sends RPM 0/0, because the old speed may prevent power.
     * For a wheel that rolls, the odometry keeps the distance.
 
-    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. −30 RPM is near
-    this set-point. −68 RPM is a wheel with full power from a saturated controller.
+    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. A wheel at −68 RPM
+    gets full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
@@ -231,8 +227,7 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
     """Blocked wheels that are commanded backward do not undo the forward drive in the odometry.
 
-    The pose moves by less than 0.15 m. ``reset``: whether the odometry is reset before the backward
-    command.
+    ``reset``: whether the odometry is reset before the backward command.
     """
     driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
     for step in range(50):

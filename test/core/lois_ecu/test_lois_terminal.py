@@ -79,10 +79,9 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The driver reports the end of a terminal mode once, even if the first lines of it are lost.
+    """The driver reports the end of a terminal mode once, even if the board misses the first lines.
 
-    The driver restores the "short correction" that the mode overwrote, and the robot obeys
-    commands.
+    The driver also restores the "short correction" that the mode overwrote.
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -162,7 +161,7 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
     """While the e-stop is latched, the driver sends only Stop to a board in compass mode.
 
-    The public firmware reads only 480 characters a second in this mode. Later lines still arrive.
+    The public firmware reads only 480 characters a second in this mode.
     """
     bench = Bench("firmware")
     configure(bench, COMPASS)
@@ -220,7 +219,8 @@ def test_a_terminal_mode_refuses_a_reset_at_once(firmware: str) -> None:
 def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
     """A record that the driver has given up is dropped when it arrives.
 
-    The driver gives it up because the drive mode changes. The lines still show a connected board.
+    The drive mode has changed during the record. The record still shows that the board is
+    connected.
     """
     bench = Bench("firmware")
     bench.record(RecordKind.TORQUE, 60)

@@ -39,8 +39,7 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
     """The left short correction keeps its value when settings are written during a drive.
 
-    Bug: the fifth round stopped after its first line, the mode, which sets the correction to almost
-    0.
+    Bug: the fifth round stopped after the mode line, which sets the correction to almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -56,10 +55,9 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
-    """The board has the left short correction after each writing, even if lines lose characters.
+    """The left short correction is right after each writing, even if lines lose characters.
 
-    The mode line of a round sets the correction to almost 0. A single line to restore it was often
-    lost.
+    The mode line sets the correction to almost 0. A single line that restored it was often lost.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)
@@ -81,8 +79,7 @@ def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
 ) -> None:
     """A board that another program left rolling, with the other form of lines, obeys a Stop.
 
-    The Stop comes within half a second of the opening of the port, even if the user commands
-    motion.
+    The Stop comes within half a second of the opening of the port, with or without commands.
 
     Bug: the robot rolled on for seconds, because the board ignored each Stop.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds. In the end, the robot rests and the server answers.
+"""Random drives on networks of all kinds. At the end, the robot rests and the server answers.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: 60 drives for each
 network. Results: docs/internals/mart_searches.md.

@@ -2,8 +2,8 @@
 
 """A model of a MART server, its network and its driver, for a search of all reachable states.
 
-A *world* is the state of all three, and a *step* leads to the next world. The model has no clock: a
-late copy of a command arrives at any later step, or is lost.
+A *world* is the state of all three, and a *step* leads to the next world. Without a clock, a late
+copy of a command arrives at any later step, or is lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -280,9 +280,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply is late, so that it may belong to an earlier command. A late reply
-    never answers a check, a controlled move or MSM: checks and moves take longer than a reply can
-    be late.
+    ``late``: whether the reply may belong to an earlier command. Such a reply never answers a
+    check, a controlled move or MSM.
     """
     driver = world.driver
     state = driver.state

@@ -47,7 +47,7 @@ Each is disturbed in a trial of its own. Regular queries and their replies are n
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
 
-The driver checks the IMU shortly before each start, and must find an older failure.
+The driver's check before each start must find an older failure.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
@@ -182,8 +182,8 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials in which a user commands ``wishes``, and one datagram is disturbed.
 
-    There is one trial for each fate of each of the first datagrams, in each direction: at most
-    ``MOST_DATAGRAMS`` for each wish.
+    Each fate of each of the first datagrams (``MOST_DATAGRAMS`` for each wish) has a trial, in both
+    directions.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

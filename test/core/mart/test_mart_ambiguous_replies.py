@@ -28,7 +28,7 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
     """The reply to the first stop shows whether the motion had begun before this stop.
 
-    "No motion" in reply to a second stop shows nothing: the first stop may have ended the motion.
+    "No motion" in reply to a second stop proves nothing: the first stop may have ended the motion.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
@@ -83,7 +83,7 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
     """A copy of an older reply does not replace a missing reply, for which the driver still waits.
 
-    Meanwhile it sends no other query whose reply has the same form.
+    Meanwhile, the driver sends no other query whose reply has the same form.
     """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)

@@ -131,9 +131,9 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """After a lost reply to a sonar query, the driver delays the next sonar query.
+    """After a lost reply to a sonar query, which may still come late, the next sonar query waits.
 
-    The lost reply may still come late. ENC (encoder) is sent at once, but its reply is doubtful.
+    ENC (encoder) is sent at once, but its reply is doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -214,8 +214,8 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
     """Only a reply that cannot be the copy of an earlier reply proves a stop.
 
-    The first stop may overtake the start, so its reply proves nothing. A copy of this reply can
-    arrive until 0.6 s after the first stop.
+    The first stop may overtake the start. A copy of the first reply can arrive until 0.6 s after
+    this stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -297,7 +297,7 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A number that is too small by the encoder is not used as the angle of a turn.
+    """A number that contradicts the encoder is not used as the angle of a turn.
 
     The number is a late encoder count.
     """
@@ -314,7 +314,7 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
     """A first heading after RM (forward drive) that equals the last heading before RM is not used.
 
-    RM sets the server's heading to zero, so the equal heading was measured before RM.
+    RM sets the server's heading to zero.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))

@@ -68,7 +68,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 ) -> None:
     """If the IMU dies in a motion, the driver stops the robot and refuses motion until a restart.
 
-    The driver reports that the server is lost. "source" reports headings only in forward drives.
+    "source" reports headings only in forward drives.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

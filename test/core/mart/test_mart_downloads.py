@@ -124,8 +124,7 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
     """If a zero command cancels the download of the log, the result says that the server has ended.
 
-    EXIT, which begins the download, ends the server. The user must copy the file from the
-    controller.
+    EXIT has ended the server. The user must copy the file from the controller.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -205,8 +204,7 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The log can still be downloaded after the reply to a stop was lost.
 
-    The repeated stop is answered with "no motion", as after a restart. The heading, which is not
-    zero, excludes a restart.
+    "No motion" in reply to the repeated stop is not taken for a restart: the heading is not zero.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -266,8 +264,7 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
     """A copy of an earlier ``ok`` is not taken for the reply to LOG, which starts the log.
 
-    LOG is lost. The driver later refuses to download a log, because the download would end the
-    server.
+    LOG is lost, so the driver later refuses a download, which would end the server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success

@@ -61,7 +61,7 @@ def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
 def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> None:
     """A first heading that arrives 0.9 s after the start of a drive does not show a dead IMU.
 
-    One heading cannot show that the heading is constant, so the drive continues.
+    One heading cannot show that the heading is constant.
     """
     bench, started_s = on(NetworkFaults(), "firmware"), math.inf
 
@@ -167,7 +167,7 @@ def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
 ) -> None:
     """After an unanswered change of the motors' units, the driver soon corrects the turn rate.
 
-    The measured speeds show whether the request or the reply was lost.
+    The measured speeds show whether the change has arrived.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.2, 0.4, 3.0)

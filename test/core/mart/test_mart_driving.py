@@ -36,7 +36,7 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
     """On a straight drive with a gyro without noise, the driver does not report a failed IMU.
 
-    The driver steers a little, and the changes of the heading show that the IMU works.
+    The driver steers a little, so that the heading changes.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -90,10 +90,7 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """A start that is lost after a curve is sent again; the old heading does not turn the odometry.
-
-    Until the second start, the server reports the heading at the end of the curve.
-    """
+    """A start that is lost after a curve is sent again. Meanwhile, the odometry does not turn."""
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
     bench.run(2.0)
@@ -117,10 +114,7 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A first heading that equals the last one of the motion before is used if the encoder moves.
-
-    The encoder shows that the drive has begun, so the heading is not an old one.
-    """
+    """If the encoder moves, the first heading of a drive is used, even an unchanged heading."""
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
     bench.run(2.0)

@@ -77,7 +77,7 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
     """If a server rejects RM (forward drive) but the robot moves, the motors are switched off.
 
-    The server knows of no motion, so it obeys no stop. The driver then refuses motion.
+    The server obeys no stop. The driver then refuses motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
@@ -107,9 +107,9 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """A robot that moves by a late copy of a rejected RM (forward drive) shows no defective server.
+    """A motion by a late copy of a rejected RM (forward drive) does not show a defective server.
 
-    The network loses replies, too. The driver stops the robot, and later allows motion.
+    The network loses replies, too.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

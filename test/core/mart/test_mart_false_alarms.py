@@ -66,7 +66,7 @@ def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
 ) -> None:
     """A slow stop of a heavy robot does not discard the next goal.
 
-    The server reports a failure, because the wheels still turn. One notice says so.
+    The server reports a failure, and one notice says that the wheels still turned.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     bench.command(*before, 3.0)
@@ -101,8 +101,8 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """If a motor is stuck in the turn to a goal, the driver discards the goal.
 
-    The server's "start timedout" is not a sufficient reason: a heavy robot that still moves causes
-    it, too.
+    "Start timedout" alone is not a sufficient reason: a heavy robot that still moves causes it,
+    too.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -115,7 +115,7 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
     """A move of a heavy robot that an obstacle ends early does not make a later move longer.
 
-    The reply to this move reports only a slow stop; the next reply reports the obstacle.
+    Only the reply to the next move reports the obstacle.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -140,8 +140,7 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn with a wrong rate is started again with other motor units, even without an angle.
 
-    The angle in the reply to the stop is missing if the robot stops slowly or the reply is late.
-    The encoder then shows the speed of the motors.
+    The reply to a slow or delayed stop has no angle. The encoder then shows the motors' speed.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)
@@ -157,10 +156,7 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     firmware: Firmware,
 ) -> None:
-    """A heavy robot that coasts for 1.3 s after a stop or an e-stop is not reported as moving.
-
-    The server reports a failure after 0.6 s.
-    """
+    """Coasting of a heavy robot after a stop is not reported as a motion without a command."""
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for number, twist in enumerate(((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9))):
         bench.command(*twist, 2.0)
@@ -175,7 +171,7 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
 def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
     """Every reply shows that the server is not silent, even a reply without a measurement.
 
-    The last reply before a gap has only the server's name, and the silence is measured from it.
+    The last reply before the gap has only the server's name.
     """
     bench = MartBench().ready()
     bench.speaks = False

@@ -65,7 +65,7 @@ def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: flo
 def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     firmware: Firmware,
 ) -> None:
-    """A new goal interrupts the move to the old goal, and its first move begins within 1.6 s."""
+    """A new goal interrupts the move to the old goal. The next move begins within 1.6 s."""
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
     bench.go_to(2.0, 0.0, 0.0)
@@ -114,7 +114,7 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
     """A straight move that is stopped after 80 s (about 20 m) does not use up the moves to a goal.
 
-    From then on, the moves are counted from zero again, so a goal can be at any distance.
+    The moves are counted from zero again.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)
@@ -129,7 +129,7 @@ def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_mov
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
     """A goal that is farther away than 1000 m is rejected, and a later goal still moves the robot.
 
-    The command for a farther goal could be too long for a request.
+    The command of a farther goal could be too long.
     """
     bench = MartBench().ready()
     with pytest.raises(CommandRefused, match="the limit is 1000 m"):

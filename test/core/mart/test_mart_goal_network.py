@@ -41,7 +41,7 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed: int) -> None:
     """A goal is reached or discarded although a quarter of all datagrams is lost.
 
-    Before a move, the driver waits until no HELLO is on its way, but only for a limited time.
+    A move waits until no HELLO is on its way, but only for a limited time.
     """
     bench = on(NetworkFaults(lose=0.25, delay_s=0.01), EVERY_FIRMWARE[seed % 3], seed)
     reach(bench, Pose(0.6, 0.3, 1.5))
@@ -178,7 +178,7 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """A first move of half the requested distance is not taken for an incomplete second run.
 
-    The driver has not learned how far this robot drives, so it adds nothing to the pose.
+    The driver has not learned yet how far this robot drives.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -202,7 +202,7 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
     """A turn whose reply is lost is counted from zero, not from the last count before the turn.
 
-    The driver then sends a stop, and "no motion" shows that the turn is complete.
+    "No motion" in reply to a stop shows that the turn is complete.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -254,10 +254,7 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
-    """A suspected copy of a turn does not end the goal if the encoder shows one complete turn.
-
-    No reply arrives for 0.3 s after the turn, and the driver sends a stop.
-    """
+    """A suspected copy of a turn does not end the goal if the encoder shows one complete turn."""
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot
 
@@ -275,7 +272,7 @@ def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware
 def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
     """An answer to a HELLO sent before a move does not prove that no copy of the move runs.
 
-    The server answers HELLO before it runs the copy. The driver stops the copy.
+    The server answers HELLO before it runs the copy.
     """
     bench = MartBench("source").ready()
     network, late = bench.robot.network[0], list[bytes]()

@@ -64,8 +64,7 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
     """An encoder count that follows the stop of a turn is not used as the angle of the turn.
 
-    The stop has overtaken the encoder query, so the angle arrives first. The driver does not learn
-    the motors' speed from the count.
+    The stop has overtaken the encoder query. The motors' speed is not learned from the count.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -107,7 +106,7 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
     """A copy of a refusal is not taken for the reply to the next check of the IMU.
 
-    A server as in the manual refuses SSP (speed of turns) and RST IMU (check of the IMU).
+    A server as in the manual refuses SSP (speed of turns) and RST IMU (the check).
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -144,11 +143,10 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """The goal is not discarded although all replies come 0.28 s late.
 
-    The driver sends a stop after a move, because the network may have duplicated the move. A quick
-    answer to this stop excludes a second run.
+    A quick answer to a stop after the move shows that no second run was stopped.
 
-    ``copied``: whether the network duplicates the move. Then the driver reports the copy, and adds
-    the first run to the odometry.
+    ``copied``: whether the network duplicates the move. The first run is then added to the
+    odometry.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""
@@ -171,7 +169,7 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     """A late reply to a start is not taken for the reply to the stop after it.
 
-    A copy of the IMU check's ``ok`` has seemed to be the reply to the start. The stop is lost.
+    A copy of the IMU check's ``ok`` has seemed to confirm the start. The stop is lost.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]
@@ -257,8 +255,9 @@ def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
     """Change the network so that it loses some commands and duplicates the next RST IMU.
 
-    The copy and its reply are each delayed by 0.29 s. ``lost``: beginnings of the commands that are
-    lost.
+    * ``lost``: beginnings of the lost commands.
+
+    The copy, and the reply to the copy, are each late by 0.29 s.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
@@ -301,7 +300,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 ) -> None:
     """A late ok to an IMU check does not confirm a turn whose command was lost.
 
-    The encoder still shows the count of the previous motion, which the odometry does not add again.
+    The odometry does not add the count of the previous motion again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)

@@ -45,8 +45,7 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """A server with a hung stop port gets no motion until a restart, even if the IMU works again.
 
-    A network gap and a change of the heading do not show a restart, which would set the heading to
-    zero.
+    A changed heading does not show a restart, which would set the heading to zero.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -72,8 +71,7 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 ) -> None:
     """A lost server is recognised, and not driven, although the network reorders its replies.
 
-    The server hung in a stop with a dead IMU. It answers all waiting requests when the IMU works
-    again, perhaps its name before the stop.
+    When the IMU works again, the server answers all waiting requests at once.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -91,8 +89,7 @@ def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
 ) -> None:
     """A driver that starts during RM or B with a dead IMU, and hangs the server, refuses motion.
 
-    The command port and the stop port hang. ``wait_s``: time in s from the driver's start until the
-    IMU works again.
+    ``wait_s``: time in s from the driver's start until the IMU works again.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
     bench.server.receive(met, 0, None, 0.0)
@@ -131,8 +128,8 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
     """A server whose process stood still for 5 s at rest is driven again.
 
-    The driver has sent stops to the stop port. It does not take the answers to waiting queries for
-    replies to these stops, which would show that the stop port may hang.
+    The server's answers to old queries are not taken for replies to stops, which would show that
+    the stop port may hang.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)
@@ -220,7 +217,7 @@ def test_a_server_that_is_lost_in_a_drive_is_reported_after_one_and_a_half_secon
 ) -> None:
     """If the network is cut in a drive, the state is ``connecting`` 1.5 s after the last reply.
 
-    The stop that begins 0.8 s after the cut does not delay the change of state.
+    The stop in the meantime does not delay the change of state.
     """
     bench = MartBench("source").ready()
     bench.command(*motion, 2.0)

@@ -2,7 +2,7 @@
 
 """Tests of the length and the speed of the moves that the driver requests on the way to a goal.
 
-The server's moves go farther than requested. The driver learns how far, and requests less.
+The server's moves go too far, so the driver requests less.
 """
 
 import math
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
     """The robot reaches each goal in fewer than ``MOST_MOVES`` moves, although moves go too far.
 
-    Turns go up to 10° too far, and drives 15 % to 30 %. The driver learns this and requests less.
+    Turns go up to 10° too far, and drives 15 % to 30 %.
     """
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
@@ -97,8 +97,7 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
     """The driver adds the first run of a move to the odometry if it has stopped a second run.
 
-    The encoder shows only the second run. The driver continues to the goal, and learns no length
-    from the stopped run.
+    The encoder shows only the second run. No length is learned from the stopped run.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)

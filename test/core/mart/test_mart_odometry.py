@@ -32,7 +32,7 @@ def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench
     """Return a bench after two motions that end with equal encoder counts.
 
     No reply arrives from the start of each motion until ``quiet_s`` after the beginning of its
-    stop. Afterwards, the function checks that the covariance covers the error.
+    stop. The covariance is checked after each motion.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -56,10 +56,9 @@ def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench
 def test_the_covariance_of_the_twist_covers_its_error(
     firmware: Firmware, twist: tuple[float, float]
 ) -> None:
-    """The variances of the twist cover its error while the robot speeds up.
+    """The variances of the twist cover its error, also while the robot speeds up.
 
-    The measured mean speed is then too low. The normalised squared errors of speed and turn rate
-    are at most 1 on average, over three drives.
+    The measured mean speed is then too low.
     """
     bench = MartBench(firmware, seed=1).ready()
     chassis = bench.server.chassis
@@ -175,7 +174,7 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
     """If the count after a second motion equals the count before, the covariance covers two cases.
 
-    The server never got the second start, or the second motion was equal to the first.
+    The second start was lost, or the second motion was equal to the first.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)

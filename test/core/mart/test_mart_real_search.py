@@ -50,7 +50,7 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
     """After SL (stop port), the driver does not send SRM, the usual stop of a forward drive.
 
-    SRM would then hang the server. The network has lost the first stops of the driver.
+    SRM would then hang the server. The first stops were lost.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""

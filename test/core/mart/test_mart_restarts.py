@@ -226,7 +226,7 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 ) -> None:
     """After a restart in a curve, the covariance covers an error of the yaw of up to 80°.
 
-    The motors keep running for some seconds, and the server's heading begins at zero.
+    The motors run on, and the server's heading begins at zero.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)
@@ -242,7 +242,7 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
     offset_s: float,
 ) -> None:
-    """A controller that replaces another server at its address is not crashed while it starts up.
+    """The driver does not crash a controller that is started in place of another server.
 
     The address is never silent, so no silence shows the change.
     """
@@ -271,8 +271,7 @@ def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_lose
 ) -> None:
     """The driver switches running motors off with MCS soon after a restart, without waiting.
 
-    The restarted server knows of no motion, so stops have no effect. The network loses and
-    duplicates datagrams.
+    The restarted server knows of no motion, so stops have no effect.
     """
     faults = NetworkFaults(lose=0.05, duplicate=0.05, delay_s=0.05)
     bench = MartBench(faults=faults, seed=seed).ready()
@@ -307,7 +306,7 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
     """On a bad network, a restarted server without MCS is stopped by a turn of one degree.
 
-    The counts that show the motion may come long after the stops, which find no motion.
+    The counts that show the motion may come long after the stops.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()
@@ -350,8 +349,7 @@ def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarte
 def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot_s: float) -> None:
     """A quick restart in B (backward drive) is noticed, and the driver begins the drive anew.
 
-    A restarted server no longer stops the robot at an obstacle. It refuses ``CS 0 0``, which the
-    driver sends once a second.
+    The restarted server refuses ``CS 0 0``, which the driver sends once a second.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 4.0)

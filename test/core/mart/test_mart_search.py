@@ -144,8 +144,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    While the command port is silent, the motion, ``port`` and ``released`` cannot be observed, and
-    are set to fixed values.
+    While the command port is silent, the other parts cannot be observed, and are set to fixed
+    values.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
@@ -156,7 +156,7 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    * Busy server: only SL and SS are compared, because it executes only its stop port's commands.
+    * Busy server: only the commands of the stop port (SL and SS) are compared.
     * After the stop port has stopped a motion (``released``): all commands except ``L`` are
       compared.
     """

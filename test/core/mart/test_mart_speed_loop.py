@@ -40,8 +40,7 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 ) -> None:
     """The true speed of a faster motor, measured at 14 units, does not lower the learnt line there.
 
-    A speed at 26 units that was measured too low has lowered the line before, because the line has
-    no positive speed at zero units.
+    A speed at 26 units that was measured too low has already lowered the line.
     """
     line = MotorLine()
     for _ in range(8):
@@ -178,10 +177,9 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """A change of speed is at most 15 units in a forward drive, and 5 in a backward drive.
+    """On a slow network, a change of speed is at most 15 units forward, and 5 units backward.
 
-    The network may duplicate a change, and in a backward drive the heading may not show this. The
-    lower limit is for a slow network.
+    In a backward drive, the heading may not show that the network has duplicated a change.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

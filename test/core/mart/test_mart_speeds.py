@@ -112,7 +112,7 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
     """After something has slowed a turn of 0.5 rad/s, the robot turns at less than 0.9 rad/s.
 
-    If the driver has learned from an earlier turn, the robot stays below 0.6 rad/s.
+    After an earlier turn, from which the driver learns, the limit is 0.6 rad/s.
     """
     bench = MartBench("source").ready()
     if learned:
@@ -136,8 +136,7 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
     """A turn on the spot does not change the balance of the motors.
 
-    The turn shows only their mean speed. With the balance set by the user (``motor_balance``), a
-    later drive backward is straight.
+    With the right balance (``motor_balance``), a later drive backward is straight.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(

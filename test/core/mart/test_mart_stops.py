@@ -218,7 +218,7 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 ) -> None:
     """On a good network, the robot has the speed of the next motion within 1.5 s.
 
-    A second stop may be answered with "no motion", which is not taken for a sign of a restart.
+    "No motion" in reply to a second stop is not taken for a sign of a restart.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)
@@ -258,7 +258,7 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 ) -> None:
     """The driver waits longer than the network delay from the last usual stop to the stop port.
 
-    A command to the stop port directly after SM or SRM could hang the server.
+    The server could hang if the stop port is used directly after SM or SRM.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)

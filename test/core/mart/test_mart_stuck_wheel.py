@@ -2,7 +2,7 @@
 
 """Tests of a wheel that is stuck in a turn, in a drive or in a controlled move.
 
-The controller counts only the right wheel, and measures the angle of a turn by the gyro.
+The controller counts only the right wheel, and measures turns by the gyro.
 """
 
 import math
@@ -26,8 +26,7 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 ) -> None:
     """If a wheel gets stuck in a turn to a goal, the driver discards the goal.
 
-    The encoder of the right wheel and the gyro show different angles. The covariance covers the
-    difference.
+    The covariance covers the difference between the angles of the encoder and of the gyro.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 0.0, 2.6)
@@ -46,7 +45,7 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
     """A left wheel that is stuck in a turn is reported, and the covariance covers the error.
 
-    The angle in the reply to the stop differs from the angle by the right wheel's encoder.
+    The true angle differs from the angle by the right wheel's encoder.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)

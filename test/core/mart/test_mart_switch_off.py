@@ -2,8 +2,8 @@
 
 """Tests that no motor stays on after a straight move.
 
-The public server may leave one motor on, by a last correction of the heading. So the driver sends
-MCS, which stops both motors, and then MSM, which ends the direct control.
+The public server may leave one motor on. The driver sends MCS, which stops both motors, and then
+MSM, which ends the direct control.
 """
 
 from collections.abc import Callable
@@ -124,8 +124,7 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
     """The driver sends MSM only when no late copy of MCS can arrive any more.
 
-    A copy of MCS after MSM would begin the direct control of the motors again. MCS was repeated
-    here, because its first reply was lost.
+    A copy of MCS after MSM would begin the direct control of the motors again.
     """
     bench = creeping()
     since = len(bench.written)
@@ -199,8 +198,7 @@ def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply:
 def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
     """The driver ends the direct control of the motors even if MCS seemed to be unknown.
 
-    A late "not supported" has seemed to be the reply to MCS. MSM follows when the server refuses
-    the next motion.
+    A late "not supported" has seemed to be the reply to MCS.
     """
     bench = creeping()
     network = bench.robot.network[0]
@@ -292,7 +290,7 @@ def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
 ) -> None:
     """A new driver sends MSM to end the direct control (MCS) that an earlier driver has left on.
 
-    The robot then drives, even if the network fails at first, and the driver uses the stop port.
+    The robot then drives, even if the network fails at first.
     """
     bench = MartBench("source")
     bench.server.receive(BOTH[0], 0, None, 0.0)
@@ -329,9 +327,8 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
     """A second copy of the reply to MSM is not taken for the reply to RST IMU (check of the IMU).
 
-    An ``ok`` to RST IMU would show that SRM (a stop) is safe, but SRM would hang the server after
-    the stop port. The driver gives a notice: the server reports a motion although the robot is at
-    rest.
+    The reply to RST IMU would permit SRM (a stop), which would hang the server after the stop port.
+    A notice says that the server reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)
