@@ -131,7 +131,7 @@ def test_what_three_lost_characters_leave() -> None:
     """Three characters of a motion line are lost.
 
     In less than 1 % of these cases, the board reads another motion. The numbers are in
-    docs/boards/fejemis.md.
+    docs/internals/fejemis_protocol.md.
     """
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
