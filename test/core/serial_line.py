@@ -2,7 +2,7 @@
 
 """A board's byte stream with known sampling times, and the ways in which it reaches a host.
 
-The module is written from the manual and shares no code with the driver. Times are host times in s.
+The module is written from the manual, without code of the driver. Times are host times in s.
 """
 
 import math
@@ -23,10 +23,8 @@ Chunker = Callable[[list[Byte], random.Random], Iterator[Read]]
 class Board:
     """A simulated stream of frames from a board.
 
-    ``skew``: relative error of the tick's duration, measured by the host's clock; positive if the
-    tick is too long.
-
-    ``loss``: fraction of the frames that are lost.
+    ``skew``: relative error of the tick's duration by the host's clock; positive if ticks are too
+    long. ``loss``: fraction of lost frames.
     """
 
     seconds: float
@@ -102,8 +100,8 @@ def ftdi(
 ) -> Chunker:
     """Return a function that splits the stream into packets of 62 bytes, as an FTDI adapter does.
 
-    If a timer of ``latency_s`` runs out, a packet ends with fewer bytes. The timer runs freely, or
-    begins again with a packet's first byte (``restarted_by_data``).
+    A packet is shorter if the timer of ``latency_s`` runs out. ``restarted_by_data``: whether a
+    packet's first byte restarts the timer.
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:

@@ -2,8 +2,7 @@
 
 """A synthetic board for odometry tests. It moves with given body twists and returns readings.
 
-It computes with rotation matrices. It shares no code with the driver, so that it can show errors in
-the driver's code.
+It shares no code with the driver, so that it can show errors in the driver's code.
 """
 
 import math
@@ -95,8 +94,7 @@ def heading(yaw: float) -> PoseReading:
 def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
     """Deliver a pose of the board twice; return the odometry estimates of the second delivery.
 
-    The odometry accepts the pose only when it comes for the second time. The first delivery gives
-    no estimates.
+    The odometry accepts a pose only when it is confirmed.
     """
     assert odometry.settle(pose) == []
     return odometry.settle(pose)

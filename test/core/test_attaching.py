@@ -48,10 +48,9 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
     lost: tuple[int, ...], turn: float, frame: str
 ) -> None:
-    """The driver attaches to a moving robot, and displacements are lost before two poses agree.
+    """Motion that was interpolated before the first two poses agreed is not taken back.
 
-    The odometry interpolates these displacements. The poses after it agree with the odometry, so
-    they do not move it.
+    The driver attaches to a moving robot. The later poses agree with the odometry.
     """
     odometry, trip, missing, estimates = Odometry(SETTINGS), Trip(0.7), 0, []
     for number in range(60):
@@ -68,10 +67,9 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 
 
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
-    """A damaged pose is 15 mm and 0.04 rad off, and its count is wrong.
+    """A damaged pose leaves no error, although the next pose seems to show a restart.
 
-    So the count of the next pose seems to begin anew. This pose undoes the error, because it lies
-    where the odometry expects it.
+    The next pose lies where the odometry expects it, and undoes the error.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):
@@ -142,10 +140,9 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The board sends no pose at first, so the odometry assumes heading 0.
+    """If the first poses come late and agree, motion is computed with their heading from then on.
 
-    Later, poses with another heading arrive, and agree with each other. Odom does not jump. From
-    then on, motion is computed with the heading of these poses.
+    Before, the odometry has assumed heading 0. Odom does not jump.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):
@@ -157,10 +154,9 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """One pose with an unexpected heading changes nothing.
+    """One pose with an unexpected heading changes nothing. Two in a row show a new earth frame.
 
-    If two poses in a row have the same unexpected heading, the board has a new earth frame. Odom
-    then continues without a jump.
+    Odom then continues without a jump.
     """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
@@ -220,10 +216,9 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """The heading is known once two poses of the board agree.
+    """The heading is known from two poses that agree until a gap of 20 displacements.
 
-    After a gap of 20 displacements, the heading is unknown again. A heading of 0 that the odometry
-    has only assumed is also regarded as unknown.
+    A heading of 0 that is only assumed counts as unknown.
     """
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known

@@ -70,7 +70,7 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 1.0), ("body", 0.5)])
 def test_after_a_minute_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: float) -> None:
-    """A line loses 1 byte in 1000, and bursts of bytes. Odom is right within 2 cm.
+    """On a line that loses 1 byte in 1000, and bursts of bytes, odom is right within 2 cm.
 
     At most one IMU reading per minute is wrong. After 1.5 s without losses, odom is right within
     1.5 mm.

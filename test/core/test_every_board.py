@@ -49,9 +49,9 @@ def assert_obeys(bench: AnyBench, within_s: float = 3.0) -> None:
 
 @pytest.mark.slow
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The robot is commanded to drive 0.3 m/s for 4 s. It drives about 1.2 m.
+    """A command of 0.3 m/s for 4 s moves the robot by about 1.2 m, or less if it starts late.
 
-    A robot that starts late drives less far. Odometry has the true distance within 2 cm.
+    Odometry has the true distance within 2 cm.
     """
     bench.drive_on(0.3, 4.0)
     bench.run(1.5)
@@ -103,9 +103,9 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench,
 ) -> None:
-    """This process stalls for up to 9 s while the robot drives, and the board's data waits unread.
+    """After a stall of up to 9 s, the robot stops and stays at rest until a new command moves it.
 
-    After each stall the robot stops, and stays at rest until a new command moves it.
+    During the stall, the board's data waits unread.
     """
     for seconds in (0.5, 9.0, 2.0):
         bench.drive_on()
@@ -182,10 +182,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """A robot is disconnected while it drives. When it is connected again, the driver stops it.
-
-    For 5 s, nothing arrives in either direction. The robot may have driven all the time.
-    """
+    """A robot that was disconnected during a drive is stopped when it is connected again."""
     bench.drive_on()
     bench.speaks = bench.hears = False
     bench.run(5.0)
@@ -198,11 +195,9 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_again(
     bench: AnyBench,
 ) -> None:
-    """The driver still repeats Stop when a line that was cut carries data to the robot again.
+    """Without a proof of a stop, Stop is repeated for 5 s, in case the line works again.
 
-    The line is cut in both directions during a drive. Without a proof of a stop, the driver repeats
-    Stop for 5 s. After 4 s, the robot receives again, but the driver still receives nothing. So the
-    robot gets one of the last Stops.
+    Here, the robot receives again after 4 s, but the driver still receives nothing.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False

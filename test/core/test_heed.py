@@ -37,10 +37,9 @@ REQUESTS = {400: Request.START, 700: Request.PAUSE, 1000: Request.START, 1300: R
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
     drives: bool, run: bool
 ) -> None:
-    """``process`` returns False if nothing is left to do after a read.
+    """``process`` returns False if a read leaves the session nothing to write or to report.
 
-    Nothing is left to do if the session has nothing to write and nothing to report. In most cases,
-    this is so after a read that contains only IMU readings.
+    Most reads that contain only IMU readings do so.
     """
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0

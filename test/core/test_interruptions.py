@@ -40,9 +40,9 @@ def restart_unheard(on: Line, boots_s: float, runs_s: float) -> None:
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", [0, 3, 5])
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The board is paused during a drive, and the robot rolls until it stops.
+    """A pause during a drive loses no motion, even if all frames of the pause are lost.
 
-    In half of the tests, all frames of the pause are lost. One second later, odom is right.
+    The robot rolls until it stops. One second after the pause, odom is right.
     """
     on = line(seed)
     if hidden:
@@ -106,10 +106,9 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
 def test_a_restarted_board_that_first_moves_unheard_does_not_move_odom_to_its_origin(
     frame: str,
 ) -> None:
-    """The board restarts and drives for 0.4 s before its frames are heard again.
+    """If a restarted board drives for 0.4 s unheard, odom still continues from its last pose.
 
-    So its first poses are neither at its new origin nor at the old place, although the robot could
-    have reached them without a restart. Odom continues from its last pose.
+    The board's first poses are neither at its new origin nor at the old place.
     """
     on = Line(BoardSettings(seed=1, frame=frame, running=True), seed=1)
     on.run(4.0)
@@ -147,10 +146,9 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Frames are lost. Then the odometry is reset, before the board's next pose arrives.
+    """Motion that was lost before a reset of the odometry does not appear in odom.
 
-    This pose shows the motion of the lost frames. The motion happened before the reset, so it does
-    not appear in odom.
+    The board's next pose, which comes after the reset, shows this motion.
     """
     for seed in range(4):
         on = line(seed)
@@ -185,9 +183,9 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_a_quarter_of_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """The robot drives slowly for up to 15 minutes. Each delta is rounded to 0.1 mm and 0.1 mrad.
+    """In up to 15 minutes of slow driving, the rounding errors of the deltas do not add up.
 
-    The errors do not add up, because the board sends a pose after every fifth delta.
+    The board's pose after every fifth delta corrects odom.
     """
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
@@ -219,8 +217,8 @@ def float32(value: float) -> float:
 def test_wheel_counts_go_through_the_kinematics() -> None:
     """Deltas in wheel counts are converted to the motion of the robot.
 
-    All three wheels turn backward by 1/8 of a turn: the robot turns left in place. Next, wheel B
-    turns forward and wheel A backward: the robot drives straight ahead.
+    * All wheels turn backward by 1/8 of a turn: the robot turns left in place.
+    * Wheel B turns forward, and wheel A backward: the robot drives straight ahead.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -61,7 +61,7 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
     """After a stall of this process, the board has 2 s again before it counts as silent.
 
-    The reason: at the end of the stall, data that the board has sent may still wait to be read.
+    At the end of the stall, data of the board may still wait to be read.
     """
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
@@ -80,8 +80,8 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
     """The driver must wake when the next limit for a silence of the board is reached.
 
-    While the robot is driven, this limit is 0.5 s: the driver then ends the command. While the
-    robot is not driven, the limit is 2 s: the driver then regards the board as silent.
+    * Driven robot: 0.5 s, when the driver ends the command.
+    * Otherwise: 2 s, when the driver regards the board as silent.
     """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5

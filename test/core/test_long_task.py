@@ -55,11 +55,7 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task ends when a driven robot is stopped, but not if the robot was at rest all the time.
-
-    First, a task runs while the robot is at rest, and continues. Then the robot is driven and
-    stopped, which ends the task.
-    """
+    """A task ends when a driven robot is stopped, but not if the robot was at rest all the time."""
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)
     for driven in (False, False, True, True):

@@ -35,10 +35,12 @@ def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
 
 
 def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
-    """The state follows what the driver does and what it receives from the board.
+    """The state follows the port and the data of the board.
 
-    It is disconnected at first. It is connecting when the port is open, paused when the board
-    reports a pause, nominal when the board was started, and disconnected when the port is closed.
+    * Closed port: disconnected.
+    * Open port: connecting.
+    * Board that reports a pause: paused.
+    * Started board: nominal.
     """
     bench = Bench(run=False)
     assert bench.session.state == "disconnected"
@@ -104,10 +106,9 @@ def test_a_silent_board_is_told_once() -> None:
 
 @pytest.mark.parametrize("came", [b"", encode(REST)[:5]], ids=["nothing", "part of a frame"])
 def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: bytes) -> None:
-    """Three IMU frames arrive, which do not show the mode. Then the board is silent for 8 s.
+    """When the board sends again after a silence of 8 s, no stamp is from before the silence.
 
-    In one case, a part of a frame arrives during the silence. When the board sends again, the
-    stamps are from this time. None is from before the silence.
+    The mode is unknown, because only three IMU frames came before the silence.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()
@@ -129,10 +130,9 @@ def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: b
 
 @pytest.mark.parametrize("waits", [ImuFrame((0, 0, -16384), (0, 0, -1)), DeltaFrame(7, 0, 0, 255)])
 def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: Frame) -> None:
-    """The board falls silent while the decoder holds a frame. This frame is never published.
+    """A frame that the decoder holds when the board falls silent is never published.
 
-    The decoder holds the frame because its last byte may begin another frame. The mode of the board
-    is not known yet. When new data comes, the driver publishes the new data without the held frame.
+    The decoder holds it because its last byte may begin another frame.
     """
     bench, rest = Bench(), encode(REST)
     bench.open()
@@ -149,10 +149,9 @@ def test_a_frame_that_waits_when_the_board_falls_silent_is_not_published(waits: 
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """The board restarts during a drive because of a brown-out.
+    """If the board restarts during a drive, the driver starts it, but does not repeat the command.
 
-    The driver starts the board again, but does not repeat the command. So the robot stays at rest
-    until the next command.
+    The robot stays at rest until the next command.
     """
     bench.drive(0.5)
     bench.run(0.2)

@@ -2,8 +2,8 @@
 
 """Tests of pausing with the letter P, which also resumes a paused board.
 
-The driver sends P only when new data shows that the board runs. Only a new «Paused» text confirms
-a pause.
+So the driver sends P only after new data of a running board. Only a new «Paused» text confirms a
+pause.
 """
 
 import pytest
@@ -21,10 +21,9 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """The user pauses a driving robot. The driver sends Stop.
+    """The driver pauses with Stop, and then one P when new data shows that the board still runs.
 
-    When new data has shown that the board still runs, the driver sends P once. The «Paused» text of
-    the board then confirms the pause.
+    The «Paused» text of the board confirms the pause.
     """
     bench.drive(0.5)
     bench.run(0.3)
@@ -37,10 +36,9 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """The user requests a pause of a paused board. The driver sends no P.
+    """For a pause of a paused board, the driver sends no P, which would resume the board.
 
-    A P would resume the board. The driver confirms the request when a new «Paused» text of the
-    board arrives.
+    A new «Paused» text of the board confirms the request.
     """
     bench.ask(Request.PAUSE, 5.0)
     start, asked_at = len(bench.written), bench.now
@@ -54,9 +52,9 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """Another program has just paused the board, and the user requests a pause.
+    """If another program has just paused the board, a request for a pause sends no P.
 
-    The driver sends P only after new data. A paused board sends none, so the driver sends no P.
+    The driver sends P only after new data, and a paused board sends none.
     """
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
@@ -83,11 +81,9 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """The driver does not take an earlier pause by another program for its own pause.
+    """The «Paused» text of an earlier pause by another program does not confirm the user's pause.
 
-    The board is already paused, but the driver does not know this yet. The user requests a pause,
-    so the driver sends P, which resumes the board. Then the «Paused» text about the other program's
-    pause arrives. The driver does not take this text for a confirmation, and sends P again.
+    The driver's P has resumed the board before this text arrives. So the driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")
@@ -109,10 +105,9 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """The user starts a paused board, and then requests a pause.
+    """A «Paused» text from before a start does not confirm a pause that is requested later.
 
-    A «Paused» text that the board has sent before the start arrives late. The driver does not take
-    it for the confirmation of the new pause.
+    The text arrives only after the request.
     """
     bench = paused()
     notice = b""

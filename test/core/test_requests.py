@@ -85,9 +85,9 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """Requests that could not be written to a lost port are not written after it opens again.
+    """A request that was not written to a lost port is not written after the port opens again.
 
-    The request is a reset. The port is lost before the driver has written its Stop and its R.
+    The request is a reset, which has a Stop and an R.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -99,11 +99,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """During a request, the session never asks to be called before something is due.
-
-    Its ``wake_at`` is always in the future, both with a board that sends data and with a silent
-    board.
-    """
+    """During a request, ``wake_at`` is always in the future, also if the board is silent."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -117,7 +113,7 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
     """A request to start a board that already runs succeeds, and the robot drives on.
 
-    The driver still writes S, because a P of another program may be on its way to the board.
+    The driver still writes S, because a P of another program may be on its way.
     """
     bench.drive(0.3)
     start = len(bench.written)
@@ -170,9 +166,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
     """The driver sends only one R to a board that needs less than 0.1 s to boot.
 
-    The first «Paused» text arrives 0.05 s after R. The board may have sent this text before it
-    received R. But the number in the second text is one higher than in the first, so the board sent
-    both texts after its restart.
+    The first «Paused» text may be older than R, but the number of the second shows the restart.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()
@@ -186,10 +180,9 @@ def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool)
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """A paused board does not receive the R of a reset, and so does not restart.
+    """A reset fails if a paused board does not receive R.
 
-    The numbers in its «Paused» texts continue, so the driver sees that it did not restart. The
-    reset fails.
+    The numbers in the «Paused» texts continue, which shows that the board did not restart.
     """
     bench = Bench(run=False)
     bench.open()
@@ -204,8 +197,7 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
     """The first «Paused» text of a connection does not show that the board has restarted.
 
-    A reset is requested before this text, but the board does not receive R. The driver knows no
-    earlier number to compare with the text's number. So the reset fails.
+    The driver knows no earlier number to compare. So a reset whose R is lost fails.
     """
     bench = Bench(run=False)
     bench.open()
@@ -269,10 +261,9 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """The state changes only twice when a board does not receive the R of a reset.
+    """If a board does not receive R, the state becomes ``connecting`` and then ``nominal`` again.
 
-    The first change is to ``connecting``. When the driver has found that the board did not restart,
-    the state returns to ``nominal``.
+    It becomes ``nominal`` when the driver has found that the board did not restart.
     """
     bench.hears = False
     bench.events.clear()

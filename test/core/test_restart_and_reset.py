@@ -38,10 +38,9 @@ def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]
 
 @pytest.mark.parametrize("lost", [20, 25])
 def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
-    """The board restarts. Its first delta does not show that, because its count fits by chance.
+    """A restart that only the pose shows is not taken for motion in the gap.
 
-    The first pose shows the restart. It lies at the board's new origin, which is as near as the
-    robot may have driven in the gap. The odometry still does not move there.
+    The first delta's count fits by chance. The robot could have driven to the board's new origin.
     """
     odometry, estimates = driven(75, 0.004)
     before = last(estimates)
@@ -55,10 +54,9 @@ def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -
 
 
 def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertainty() -> None:
-    """The robot drives at 0.35 m/s. The board restarts, and its first count fits a gap of 1.6 s.
+    """If the first pose shows a restart in a gap of 1.6 s, odom stays, with a small uncertainty.
 
-    The first pose shows the restart. Odom stays, and only the way in which the robot came to rest
-    is uncertain.
+    Only the distance and turn in which the robot came to rest are uncertain.
     """
     odometry, estimates = driven(75, 0.014)
     for number in range(115, 120):
@@ -77,11 +75,10 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     ambiguous: bool, told_m: float, x_m: float
 ) -> None:
-    """The board restarts in a gap, and both of its counters fit the gap by chance.
+    """A pose exactly at the new origin shows a restart that both counters hide, so odom stays.
 
-    A pose exactly at the new origin, except for rounding, shows the restart, so odom stays. A pose
-    1 cm beside it shows that the robot drove there in the gap: home, to the place where the board
-    was switched on. So does a pose whose counters exclude a restart.
+    If the pose lies 1 cm beside the origin, or if the counters exclude a restart, the robot drove
+    there.
     """
     odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):
@@ -94,10 +91,9 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
 
 
 def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
-    """A displacement is lost, and then the board restarts in a long gap that the counters hide.
+    """A pose at the new origin shows a hidden restart, even if a displacement was lost before.
 
-    A pose exactly at the new origin shows the restart, so odom stays. The expected pose counts from
-    the longest gap since the last pose, and not from the first one.
+    The longest gap since the last pose counts, not the first one.
     """
     odometry, estimates = driven(75, 0.016)
     estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
@@ -112,12 +108,12 @@ def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_short_gap(
     ambiguous: bool, x_m: float
 ) -> None:
-    """The board restarts in a gap of 0.6 s, and both of its counters fit the gap by chance.
+    """A pose at the new origin shows a restart that both counters hide in a gap of 0.6 s.
 
-    The displacements after such a gap do not wait for a pose. Odom adds only the assumed motion in
-    the gap. If the counters exclude a restart, the robot drove to the origin in the gap.
+    Odom adds only the assumed motion in the gap. If the counters exclude a restart, the robot drove
+    to the origin.
 
-    Bug: odom moved to the old origin of the board, if the robot could have driven there.
+    Bug: odom moved to the board's old origin, if the robot could have driven there.
     """
     odometry, estimates = driven(75, 0.016)
     for number in range(90, 140):
@@ -186,8 +182,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
     """The odometry counts how often its frame is moved relative to the board's earth frame.
 
-    Such a move makes the goals from before it invalid. A reset, for example, moves the odometry
-    frame. Displacements and usual poses do not move it, so they are not counted.
+    Such a move, for example by a reset, makes earlier goals invalid.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
@@ -212,10 +207,9 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_a_reset_after_a_gap_leaves_no_wrong_heading(
     lost: int, use_board_pose: bool, frame: str
 ) -> None:
-    """Displacements are lost while the robot ends a turn. Then the odometry is reset.
+    """After a gap at the end of a turn, and a reset, the motion has the right direction.
 
-    The gap hides where the robot points in the board's frame. The next poses show it, so the motion
-    after the reset has the right direction.
+    The gap hides the heading in the board's frame. The next poses show it.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
     attach(odometry, trip.pose)
@@ -239,10 +233,9 @@ def test_a_reset_after_a_gap_leaves_no_wrong_heading(
 def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
     duration_s: float | None,
 ) -> None:
-    """The odometry is reset in a gap of 3 s, near its end or near its beginning.
+    """If the odometry is reset near the end of a gap, odom does not contain the lost motion.
 
-    Near the end, the lost motion is older than the reset, so odom does not contain it. Near the
-    beginning, odom contains it.
+    After a reset near the beginning, odom contains it. The gap lasts 3 s.
     """
     for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
         odometry, trip = Odometry(SETTINGS), Trip()

@@ -61,8 +61,10 @@ def lose_once(bench: MartBench, begins: bytes) -> None:
 def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
     """Let the network duplicate the next ``request``.
 
-    The copy arrives ``after_s`` later than the request. The files sent in reply to the copy are
-    delayed by ``late_s``, in s. Return a list to which the arrival time of the copy is added.
+    Return a list to which the arrival time of the copy is added.
+
+    ``after_s``: delay of the copy, in s. ``late_s``: further delay of the files sent in reply to
+    the copy, in s.
     """
     copied_s: list[float] = []
     there, back = bench.robot.network[0].to_board, bench.robot.network[0].from_board
@@ -124,10 +126,9 @@ def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("inequality", [-0.05, 0.05])
 def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequality: float) -> None:
-    """One wheel turns 5 % faster, and the server reports no heading. All goals are reached.
+    """With the recorded angles of turns, all goals are reached although one wheel is 5 % faster.
 
-    The driver learns the true angles from the records of the turns. Without these records, the
-    robot would miss the last goal by 0.2 m.
+    The server reports no heading.
     """
     bench = MartBench("source", motor_inequality=inequality).ready()
     for goal in GOALS:
@@ -143,10 +144,9 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The server has no records of its turns, or its records contain no usable angle.
+    """The driver requests no more records after three requests without a usable record.
 
-    The manual does not describe the records, so a server may be like this. The driver requests a
-    record three times, and then no more. The robot still reaches its goals.
+    The robot still reaches its goals.
     """
     bench = MartBench("source").ready()
     if missing == "angle":
@@ -161,10 +161,9 @@ def test_a_server_without_records_is_asked_three_times(
 
 @pytest.mark.slow
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
-    """One motor turns 10 % faster. A few records of turns show the ratio of the motors.
+    """When a few records have shown the ratio of the motors, the driver requests no more records.
 
-    The driver then requests no more records. It avoids needless requests, because the public server
-    never closes a file that it has sent.
+    The public server never closes a file that it has sent.
     """
     bench = MartBench("source", motor_inequality=0.1).ready()
     for _ in range(2):
@@ -179,10 +178,9 @@ def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -
 
 
 def test_the_record_of_an_earlier_turn_is_not_used() -> None:
-    """The server's file system is full, so a new turn is not recorded.
+    """The driver does not use the record of an earlier turn with the same target angle.
 
-    LAST TURN sends the record of an earlier turn with the same target angle. The driver does not
-    use this record.
+    LAST TURN sends such a record if the server could not record the new turn.
     """
     bench = MartBench("source").ready()
     for yaw_rad in (math.pi / 2, math.pi, -math.pi / 2, 0.0):
@@ -220,11 +218,9 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The network duplicates the driver's own request for a record (LAST TURN).
+    """The user gets the right file although the network has duplicated the driver's own LAST TURN.
 
-    So the server sends this record a second time, later. The driver waits until such late replies
-    can no longer arrive, and then sends the user's request (~/download_last_move). The user gets
-    the right file.
+    The driver first waits until late replies to the copy can no longer arrive.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))
@@ -265,11 +261,7 @@ def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
 
 
 def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> None:
-    """The odometry is reset after a turn. Then the record of this turn arrives.
-
-    The driver discards the record. The turn was before the reset, so its angle does not change the
-    heading in the new frame.
-    """
+    """A record of a turn before the last reset of the odometry does not change the heading."""
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
     bench.run_until(lambda: downloads(bench) == 1, 20.0)
@@ -280,10 +272,9 @@ def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> Non
 
 
 def test_a_record_makes_the_heading_more_certain_but_not_better_than_the_gyro() -> None:
-    """The record of a turn reduces the heading's variance to that of a gyro angle.
+    """A record reduces the heading's variance, but not below that of a gyro angle.
 
-    Two records have no effect: a record with an impossible angle, and a second record of the same
-    turn.
+    An impossible angle, or a second record of the same turn, has no effect.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)

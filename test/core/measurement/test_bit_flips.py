@@ -25,8 +25,7 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""Tuples that say which bit to change, and when: the kind of frame, the number of a byte in its
-payload, the number of a bit in this byte, and how many ticks the robot drives before the change."""
+"""Tuples: kind of frame, byte in its payload, bit in this byte, ticks driven before the change."""
 
 
 class Drive:
@@ -132,9 +131,9 @@ def test_a_changed_bit_leaves_little_and_after_1_5_s_nothing(
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """One bit of an IMU frame is changed. The reading is rejected, or published with a small error.
+    """An IMU reading with one changed bit is rejected, or wrong by less than 5 m/s² and 0.6 rad/s.
 
-    The error is below 5 m/s² and 0.6 rad/s. All undamaged readings are published.
+    All undamaged readings are published.
     """
     _, byte, bit, ticks = flip
     drive = Drive()

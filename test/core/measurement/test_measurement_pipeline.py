@@ -35,8 +35,7 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
     """Each odometry estimate has the stamp of the IMU sample of the same tick.
 
-    The first displacements wait for the board's first pose, and are published later. Their stamps
-    are right, too.
+    This also holds for the first estimates, which wait for the board's first pose.
     """
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
@@ -64,10 +63,9 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
+    """After a reset during a drive, odom shows the distance since the reset, or up to 20 mm more.
 
-    This distance may be up to 20 mm too long, but never too short: the first displacement after the
-    reset also contains motion from before it, which the board had not reported yet.
+    The first displacement after the reset may contain motion from before it.
     """
     for _ in range(10):
         bench.drive(0.5)
@@ -86,10 +84,9 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_closed(
     bench: Bench,
 ) -> None:
-    """While no data arrives, or the port is closed, a reset of the odometry is refused.
+    """A reset of the odometry is refused while no data arrives or the port is closed.
 
-    The robot is pushed in this time, and later data will show this motion. So odom would not stay
-    at zero after a reset. When data arrives again, a reset succeeds.
+    Otherwise, later data could add motion from before the reset.
     """
     bench.speaks = False
     bench.run(2.0)
@@ -113,10 +110,9 @@ def test_the_odometry_is_not_reset_while_the_board_is_silent_or_the_port_is_clos
 def test_a_reset_of_the_odometry_during_a_pause_forgets_the_motion_in_the_pause(
     bench: Bench,
 ) -> None:
-    """The robot is pushed by 1 m during a pause. Then the odometry is reset and the board started.
+    """After a reset in a pause, odom begins at zero, although the robot was pushed in the pause.
 
-    The board's first displacement after the pause contains the push. Nevertheless, odom begins at
-    zero.
+    The board's first displacement after the pause contains the push.
     """
     assert bench.ask(Request.PAUSE, 5.0).success
     push(bench, 1.0, 0.0, 0.3)
@@ -160,9 +156,9 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
-    """The robot rolls out while the board is paused. After the pause, odom includes this motion.
+    """After a pause, odom includes the motion in the pause.
 
-    The duration of this motion is unknown. So the first twist after the pause is unknown, too.
+    The first twist is unknown, because the motion has an unknown duration.
     """
     bench.drive(0.5)
     bench.run(0.4)

@@ -54,10 +54,9 @@ def trembling(random: Random) -> list[float]:
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Return ``count`` noisy readings of an IMU at rest, with 1 g upward.
+    """Return ``count`` noisy readings of an IMU at rest, with 1 g upward, and with the given jumps.
 
-    ``leaps``: jumps to add. The outer keys are numbers of readings, and the inner keys are numbers
-    of words in a reading.
+    ``leaps``: by number of the reading and number of the word, the value to add, in m/s² or rad/s.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
@@ -78,10 +77,9 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """A high bit of one word of a reading is changed, so the word jumps for a single reading.
+    """A reading with one changed high bit is rejected, and the next reading is released at once.
 
-    This reading is rejected, and the next one is released at once. The jumps have the sizes of high
-    bits of a sensor with ranges of 2 g and 250 °/s.
+    The sensor has ranges of 2 g and 250 °/s.
     """
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
@@ -92,10 +90,9 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """One word of the readings jumps and stays there, as when a robot is set down on a slope.
+    """After a jump that lasts, all readings are released, the first one together with the second.
 
-    The filter releases all readings. It holds the first reading after the jump until the next
-    reading arrives.
+    A robot that is set down on a slope causes such a jump.
     """
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
@@ -106,10 +103,9 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, the force along z and the gyro's values belong to another frame.
+    """A reading with the vertical force and the turn rates of another frame is rejected.
 
-    No robot changes its turn rate by this amount for a single reading, so the filter rejects the
-    reading.
+    No robot changes its turn rate by this amount for a single reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
@@ -132,10 +128,9 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A knock saturates the sensor, so the value of one reading is at the end of the scale, 2 g.
+    """A reading of a knock that saturates the sensor at 2 g is released.
 
-    A single changed bit cannot turn a reading at rest into this value. So the filter does not
-    suspect damage, and releases the reading.
+    No single changed bit turns a reading at rest into this value.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -144,10 +139,9 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """The value of a bit in m/s² depends on the scale of the sensor (``full_scale_mps2``).
+    """A reading that jumps by a high bit is rejected, whatever the scale of the sensor is.
 
-    A reading jumps by the value that a high bit has at this scale. The filter regards the bit as
-    damaged, and rejects the reading.
+    The value of a bit in m/s² depends on this scale (``full_scale_mps2``).
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -183,10 +177,9 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement is faster than 2 m/s or 8 rad/s. It is rejected, and counts as lost.
+    """A displacement faster than 2 m/s or 8 rad/s is rejected, and counts as lost.
 
-    The next displacement reports this loss. It also reports the losses that the rejected
-    displacement contained.
+    The next displacement reports this loss, and all losses that the rejected displacement reported.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -227,11 +220,7 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """A displacement jumps, so the filter holds it, and also the poses that follow it.
-
-    Usually it holds them until the next displacement. But when ten poses are held, it releases
-    everything.
-    """
+    """When ten poses wait behind a displacement that has jumped, the filter releases everything."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
     assert came[3:14] == [[]] * 10 + [[ahead(0.06), *[pose] * 10]]
@@ -249,9 +238,9 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """The robot coasts to a stop in a pause. The first displacement afterwards has all this motion.
+    """The first displacement after a pause may contain all motion of the pause.
 
-    If the robot can drive so far in the time of the pause, the filter accepts this displacement.
+    The filter accepts this displacement if the robot can drive so far in this time.
     """
     through = gate()
     through.admit(ahead(), 1.0)
@@ -322,10 +311,9 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A knock changes one reading of a sensor that sends text. The reading is released at once.
+    """A knock is released at once if the full scale is infinite, as for a sensor that sends text.
 
-    In a text, damage cannot change a single bit of a value. So the filter must not look for changed
-    bits: the full scale is set to infinity.
+    Damage to a text does not change a single bit of a value.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
@@ -362,11 +350,9 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 
 
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
-    """A board's own odometry corrects itself by a step that is too large for any robot.
+    """With ``corrected=True``, a step that no robot can drive is released as a correction.
 
-    A filter with ``corrected=True`` releases this step, but marks it as neither measured nor
-    possible (``measured=False``, ``possible=False``). It rejects a step only if it contains NaN or
-    infinity.
+    It has ``measured=False`` and ``possible=False``. A step with NaN or infinity is rejected.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

@@ -21,11 +21,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """The motion monitor stops a robot with wrong wiring. The user switches the monitor off.
-
-    Then the robot drives without being stopped. When the user switches the monitor on again, it
-    stops the robot again.
-    """
+    """The motion monitor stops a robot with wrong wiring only while the monitor is switched on."""
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)
@@ -37,10 +33,9 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """The motion monitor is off, and a motion limit is set too low, so displacements are rejected.
+    """Displacements rejected while the motion monitor was off do not stop the robot later.
 
-    The limit is corrected, and the monitor is switched on again. The monitor does not stop the
-    robot.
+    They were rejected because a motion limit was too low.
     """
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
@@ -53,10 +48,9 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """The motion monitor is off. The driver rejects displacements, because a limit is too low.
+    """Four displacements that are rejected after the motion monitor is on again stop the robot.
 
-    Then the user switches the monitor on, and the driver still rejects displacements. After four
-    more rejected displacements, the monitor stops the robot.
+    Displacements that were rejected while the monitor was off do not count.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)
@@ -81,11 +75,9 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """After a stop by the motion monitor, a sender that does not pause cannot move the robot.
+    """After a stop by the motion monitor, a sender that does not pause must first command zero.
 
-    The driver refuses motion commands until a zero command comes. Then the sender can move the
-    robot again. If the monitor stops the robot a second time, a zero command is not enough: the
-    driver refuses motion commands until ~/start is called.
+    After a second stop, its motion commands are refused until ~/start is called.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -134,10 +126,9 @@ def test_a_refusal_that_silence_has_ended_is_not_shown() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """The motion monitor has stopped the robot. Then the driver stalls, and loses commands.
+    """The time in which the driver stalls does not count as silence of the sender.
 
-    The driver refuses commands until the sender has been silent for the timeout. The time of the
-    stall does not count as silence, so this silence must begin after the stall.
+    So a stall does not end the refusal of commands after a stop by the motion monitor.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -150,10 +141,9 @@ def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
 
 
 def test_a_stall_of_the_driver_does_not_bring_back_a_refusal_that_has_ended() -> None:
-    """The driver stalls after a refusal of commands has ended. The next command is obeyed.
+    """A stall of the driver does not bring back a refusal of commands that has ended.
 
-    The motion monitor has stopped the robot, so the driver refuses commands. No command comes for
-    ``cmd_vel_timeout``, which ends the refusal. Then the driver stalls.
+    The motion monitor caused the refusal, and silence of the sender ended it.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -165,10 +155,9 @@ def test_a_stall_of_the_driver_does_not_bring_back_a_refusal_that_has_ended() ->
 
 
 def test_a_longer_timeout_does_not_bring_back_a_refusal_that_has_ended() -> None:
-    """The driver has refused commands since the motion monitor stopped the robot.
+    """A longer ``cmd_vel_timeout`` does not bring back a refusal of commands that has ended.
 
-    No command came for ``cmd_vel_timeout``, so the driver does not refuse commands any more. Then
-    the user sets a longer timeout. The driver still obeys the next command.
+    The motion monitor caused the refusal, and silence of the sender ended it.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

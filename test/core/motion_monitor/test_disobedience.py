@@ -80,10 +80,9 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """The board sends a displacement only every 0.1 s. The robot is still stopped within 0.3 s.
+    """With a displacement only every 0.1 s, the robot is still stopped within 0.3 s.
 
-    Three displacements that deviate from the command take 0.3 s, so the monitor must not wait for a
-    fourth.
+    So the monitor must find the fault in three displacements.
     """
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
@@ -97,9 +96,9 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """Displacements come every 0.1 s. One is near zero, because the robot reverses within it.
+    """A robot that reverses within a displacement of 0.1 s is not mistaken for a held robot.
 
-    The monitor does not mistake this for a robot that is held. It stops the robot within 0.3 s.
+    The monitor stops the robot within 0.3 s, although this displacement is near zero.
     """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
@@ -116,11 +115,9 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """The board's switch is on position control, so the board takes a velocity for a goal.
+    """A robot whose board takes a velocity for a goal is stopped within 0.3 s and 5 cm.
 
-    The small numbers of a slow velocity mean a goal near the board's origin. The robot is 3 m in
-    front of this origin, so it drives backward although forward is commanded. The driver stops it
-    within 0.3 s and 5 cm.
+    The board's switch is on position control, and the goal lies behind the robot.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
@@ -211,10 +208,9 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """The robot drives away from its goal, so the motion monitor reports a fault.
+    """If the robot drives away from its goal, the motion monitor trips, and goals are refused.
 
-    After the fault, the driver refuses goals. Otherwise a node that repeats its goal could set the
-    robot in motion again.
+    Otherwise a node that repeats its goal could set the robot in motion again.
     """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)

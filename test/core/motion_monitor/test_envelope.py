@@ -141,10 +141,9 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """A held robot falls behind its set-point, so its wheel controllers wind up.
+    """A held robot's wind-up grows by 1.2 times the distance that it falls behind, up to a limit.
 
-    The wind-up grows by 1.2 times the distance that the robot falls behind, up to the integrator's
-    limit. Normal motion reduces it.
+    Normal motion reduces the wind-up.
     """
     wind_up = WindUp()
     for _ in range(10):
@@ -168,8 +167,7 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
     """A displacement of zero over 0.1 s does not prove that a robot is held. Two in a row prove it.
 
-    Motion is commanded. In 0.1 s, the robot may have reversed its direction, so that its
-    displacement is zero although it is not held.
+    The robot may have reversed its direction within a single displacement.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -182,10 +180,9 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """A robot moves faster than its set-points allow. The wind-up shrinks by the extra distance.
+    """If a robot moves faster than its set-points allow, the wind-up shrinks by the extra distance.
 
-    The wind-up is the distance that the wheel controllers may still drive in addition to the
-    commanded motion. It does not fall below zero.
+    The wind-up does not fall below zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

@@ -89,9 +89,9 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """A robot speeds up slowly in the wrong direction.
+    """The monitor finds that a robot speeds up slowly in the wrong direction.
 
-    The monitor finds this within 0.3 s after the robot has reached 0.05 m/s.
+    It does so within 0.3 s after the robot has reached 0.05 m/s.
     """
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
@@ -121,10 +121,7 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot is up to 25 % too fast, or too slow. If it is too fast, the monitor finds no fault.
-
-    If it is too slow, the only possible fault is "blocked".
-    """
+    """A robot may be up to 25 % too fast. If it is slow, the only possible fault is "blocked"."""
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -157,10 +154,7 @@ def test_a_new_command_may_be_followed_late() -> None:
 
 
 def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
-    """The robot is commanded to slow down to a fifth, but keeps its speed.
-
-    The monitor finds this.
-    """
+    """The monitor finds a fault if the robot is commanded to slow down, but keeps its speed."""
     drive = Drive()
     drive.command(0.5, 0.0, 0.0)
     drive.move((0.5, 0.0, 0.0), 1.0)
@@ -203,10 +197,10 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """A robot does not move in spite of a command. The monitor returns a fault each second.
+    """While a commanded robot does not move, the monitor returns a fault each second.
 
-    The caller must filter out the repetitions. After a release of the e-stop, the monitor returns a
-    different fault: the board may still be in its own emergency stop.
+    The caller must filter out the repetitions. After a release of the e-stop, the fault is
+    ``HELD_BY_ESTOP``.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -218,10 +212,9 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot that was held may then drive too fast, until it has made up for the lost distance.
+    """A robot that was held may drive too fast until it has made up for the lost distance.
 
-    The robot should drive at 0.4 m/s. It is held for 1 s, so it falls 0.4 m behind. After it has
-    made up for this distance, too high a speed is a fault.
+    Afterwards, too high a speed is a fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
@@ -245,10 +238,9 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot that has obeyed Stop is pushed for a long time.
+    """While a robot that has obeyed Stop is pushed, the time between faults becomes ever longer.
 
-    The monitor reports a fault repeatedly, and the driver sends Stop for each fault. The time from
-    one fault to the next becomes longer each time.
+    The driver sends Stop for each fault.
     """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
@@ -256,11 +248,9 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot drives on, because it has not received Stop.
+    """While a driven robot does not obey Stop, the monitor reports a fault every 5 s.
 
-    The monitor reports a fault every 5 s, and the driver sends Stop each time, because a later Stop
-    may arrive. This period does not become longer, as it would for a pushed robot that has obeyed
-    Stop.
+    This period does not become longer, because a later Stop may arrive.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -299,11 +289,9 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """Four impossible displacements in a row are a fault.
+    """Four impossible displacements in a row are a fault; three may correct the board's odometry.
 
-    Up to three in a row may be a correction of the board's own odometry, so the outlier filter does
-    not reject them. After a possible displacement, the monitor counts from zero again. While the
-    robot rolls out after the fault, the monitor reports no second fault.
+    A robot that rolls out after the fault causes no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)
@@ -350,9 +338,9 @@ orders = st.lists(
 def test_a_robot_that_obeys_late_and_with_slip_never_trips(
     given_orders: list[tuple[Triple, int]], late_ticks: int, constant_s: float, scale: Triple
 ) -> None:
-    """Commands are random. The robot obeys up to 0.1 s late, with a time constant of up to 0.2 s.
+    """A robot that obeys up to 0.1 s late, with a time constant of up to 0.2 s, causes no fault.
 
-    The monitor reports no fault except "blocked", which does not stop the robot.
+    The only exception is "blocked", which does not stop the robot.
     """
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0

@@ -40,11 +40,9 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """``rolled`` is the sum of all displacements, in the robot's axes.
+    """``rolled`` is the sum of all displacements in the robot's axes, whatever axes the board uses.
 
-    This is so whether the board reports displacements along the axes of the earth or of the robot.
-    The test also converts ``rolled`` to wheel angles, and these angles back to a motion of the
-    body. This motion turns the body by the same angle as ``rolled``.
+    The wheel angles that belong to ``rolled`` give the same turn of the body.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
@@ -99,11 +97,9 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """Displacements are lost in a drive. The driver estimates how far the wheels turn in the gap.
+    """After a gap of up to 0.4 s, the wheel angles agree with the encoders within 0.12 rad.
 
-    A second after the gap, the wheel angles are compared with the encoders. After a gap of up to
-    0.4 s, they agree within 0.12 rad. After a gap of 2 s in curves, the error is larger, because
-    the driver assumes the shortest path.
+    After 2 s in curves, the error is up to 5 rad: the driver assumes the shortest path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

@@ -58,10 +58,9 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 @pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """A robot that does not obey is reported a second time if it has obeyed in between.
+    """A robot that does not obey is reported again if it has obeyed in between.
 
-    The user drives three times. The first and the third time, the line to the board is cut, so the
-    robot does not obey. Each of these two drives gives a notice.
+    The line to the board is cut in the first and the third of three drives.
     """
     bench = standing()
     for hears in (False, True, False):
@@ -76,10 +75,9 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """The user commands 1 mm/s, and then a zero speed. No notice appears.
+    """No notice appears for a command of 1 mm/s, or for a zero speed.
 
-    The reason is that neither command can show whether the robot obeys. A motion of 1 mm/s is
-    within the noise. A robot at rest fulfils a zero speed even if it does not obey.
+    Neither shows whether the robot obeys: a motion of 1 mm/s is within the noise.
     """
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)

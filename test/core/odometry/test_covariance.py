@@ -55,9 +55,9 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """The sizes of both wheels are uncertain by 1 %, and the robot drives 1 m forward.
+    """Two wheel sizes are uncertain by 1 %, and the robot drives 1 m forward.
 
-    Each wheel adds standard deviations of 0.025 rad to the yaw and of 5 mm to x.
+    Each wheel adds standard deviations of 0.025 rad in yaw and 5 mm in x.
     """
     noise = OdometryNoise(
         wheel_drift=0.0,
@@ -129,10 +129,9 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """The wheel sizes are uncertain, and the robot drives 10 m forward and 10 m back.
+    """The error of uncertain wheel sizes grows with the distance, and a drive back removes it.
 
-    After 10 m, the standard deviation of the yaw is ten times the standard deviation after 1 m. At
-    the end of the drive, it is zero.
+    The standard deviation of the yaw after 10 m is ten times that after 1 m.
     """
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
@@ -148,10 +147,9 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 
 @pytest.mark.slow
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
-    """Forty simulated robots drive with wheel sizes wrong by 1 % and slip of 2 %.
+    """The mean NEES of forty robots with wheel sizes wrong by 1 % and slip of 2 % is about 3.
 
-    The mean of their normalised squared errors (NEES) is about 3, so the covariance is right. The
-    test allows 2.29 to 3.80, the range of 95 % of such means.
+    The limits, 2.29 and 3.80, contain 95 % of such means.
     """
     total = 0.0
     for seed in range(40):
@@ -187,8 +185,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 def test_settling_removes_nothing_but_the_gap() -> None:
     """A pose that does not end a gap leaves the covariance unchanged.
 
-    Such a pose contains the same errors as the odometry, because the board also computes its pose
-    from the wheels.
+    The board computes its pose from the same wheels, so the pose has the same errors.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

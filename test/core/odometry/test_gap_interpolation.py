@@ -32,9 +32,9 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """Displacements of ten seconds are missing. Only two seconds of motion are estimated for them.
+    """After ten seconds without displacements, only two seconds of motion are estimated.
 
-    For the remaining time no motion is added, because the driver stops the robot of a silent board.
+    The driver stops the robot of a silent board.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
@@ -76,9 +76,9 @@ def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
 
 
 def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
-    """Ten displacements are lost; the two poses in this time show a speed of 1 m/s, not 0.5 m/s.
+    """If only poses arrive, the estimated motion takes their speed: 1 m/s, no longer 0.5 m/s.
 
-    The next lost displacement is assumed to be as long as those before the second pose.
+    Ten displacements are lost in this time.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
@@ -91,7 +91,7 @@ def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
 
 
 def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
-    """A displacement has arrived since the last pose: it shows the present motion better."""
+    """A displacement after the last pose shows the present motion better than the pose."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     bridge.missing += 1
@@ -104,10 +104,9 @@ def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
 def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it(
     frame: str, poses: int
 ) -> None:
-    """The robot turns at 2 rad/s. Then only poses arrive, and they show that the robot stands.
+    """If poses show a robot at rest, a displacement that is lost later is not taken for a turn.
 
-    After them, one more displacement is lost before the first that arrives. The odometry does not
-    assume that the robot turned as before.
+    Before, the robot turned at 2 rad/s.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -124,10 +123,9 @@ def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it
 
 
 def test_the_uncertainty_of_a_gap_does_not_depend_on_the_poses_in_it_if_they_are_not_used() -> None:
-    """Fifty displacements are lost. The poses in this gap only show their number.
+    """Poses within a gap do not change its uncertainty if they only show the number of losses.
 
-    ``use_board_pose`` is False, so no pose shows the lost motion. The standard deviation is that of
-    the whole gap: not that of many short gaps, and not that of each of its parts once more.
+    Fifty displacements are lost. ``use_board_pose`` is False, so no pose shows the lost motion.
     """
     deviations = []
     for poses in (0, 9):
@@ -147,9 +145,9 @@ def test_the_uncertainty_of_a_gap_does_not_depend_on_the_poses_in_it_if_they_are
 def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
     frame: str, turn: float
 ) -> None:
-    """The robot drives at 0.5 m/s when the board restarts, and comes to rest within 0.5 s, unseen.
+    """The covariance includes the distance and turn of a robot that rolls to rest after a restart.
 
-    If it slows down evenly, its error is at most the standard deviation, in x and in yaw.
+    The robot drives at 0.5 m/s, and slows down evenly within 0.5 s.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -165,7 +163,7 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
 
 
 def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> None:
-    """The first pose shows that five displacements are lost. Then the odometry is reset."""
+    """After a reset of the odometry, a loss that an earlier pose showed adds no motion."""
     odometry, trip = Odometry(SETTINGS), Trip()
     for _ in range(4):
         odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
@@ -179,10 +177,10 @@ def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> No
 
 
 def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> None:
-    """Two displacements are lost after a suspected restart. Two poses disprove the restart.
+    """If two poses disprove a suspected restart, the odometry estimates the motion that was lost.
 
-    ``use_board_pose`` is False, so the poses do not show the lost motion. The odometry assumes that
-    the robot continued its last motion. The estimates after the poses include the assumed motion.
+    Two displacements are lost. ``use_board_pose`` is False, so the odometry continues the last
+    motion.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
     attach(odometry, trip.pose)
@@ -229,10 +227,9 @@ def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(fram
 def test_a_loss_that_a_pose_shows_before_the_frame_is_known_is_bridged(
     frame: str, missing: int
 ) -> None:
-    """The robot drives evenly. The displacement just before the first or second pose is lost.
+    """The odometry estimates the motion of a loss that only the first or second pose shows.
 
-    Only the pose shows the loss. The board's frame is not known before the second pose, but the
-    odometry still assumes the lost motion.
+    The board's frame is not known before the second pose.
     """
     odometry, trip = Odometry(SETTINGS), Trip(0.3)
     estimates = []

@@ -44,9 +44,9 @@ def drive(on: Bench) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """The board assumes wrong sizes of its wheels and its base, and drives in curves for 10 s.
+    """With the right odometry scales, odom ends within 5 mm and 3 mrad of the true pose.
 
-    With the right odometry scales, odom ends within 5 mm and 3 mrad of the true pose.
+    The board assumes wrong sizes of its wheels and base.
     """
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
@@ -79,10 +79,9 @@ def test_the_twist_is_the_true_one() -> None:
 
 
 def test_what_has_rolled_is_the_true_way() -> None:
-    """The board assumes wrong sizes of its wheels and its base.
+    """With the right odometry scales, the distance that the robot has rolled is right within 2 mm.
 
-    The odometry scales correct this: the distance that the robot has rolled is right within 2 mm.
-    The joint angles are computed from this distance.
+    The board assumes wrong sizes of its wheels and base.
     """
     on = bench(TRUE)
     on.drive(0.2, 0.0, 0.0)
@@ -94,9 +93,9 @@ def test_what_has_rolled_is_the_true_way() -> None:
 
 
 def test_a_goal_in_odom_is_reached_in_truth() -> None:
-    """The board assumes wrong sizes of its wheels and its base. The user sends a goal in odom.
+    """With the right odometry scales, the robot's true pose reaches a goal in odom, within 5 mm.
 
-    With the right odometry scales, the robot's true pose reaches the goal, within 5 mm.
+    The board assumes wrong sizes of its wheels and base.
     """
     on = bench(TRUE, control="position")
     on.go_to(0.6, -0.4, 0.0)

@@ -34,9 +34,8 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    An undamaged board sends no pose with a coordinate above 1e7, in mm or mrad. It sends no IMU
-    frame that combines an acceleration below 0.5 g with an acceleration word of -6, which has the
-    same bytes as a header.
+    * Pose: no coordinate is above 1e7, in mm or mrad.
+    * IMU frame: below 0.5 g, no acceleration word is -6, which has the same bytes as a header.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

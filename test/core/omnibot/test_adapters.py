@@ -2,9 +2,7 @@
 
 """Tests that an IMU frame is returned as soon as the packet with its last byte arrives.
 
-The tests use adapters that split the bytes into packets in different ways. The last byte of an IMU
-frame can look like the beginning of another frame. The decoder then decides by the arrival times
-whether another frame may have begun.
+If this byte looks like the beginning of another frame, the decoder decides by the arrival times.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,8 +24,7 @@ IMU_LENGTH = 14
 DRIFT = 1.0002
 """Real period of the adapter's timer by the board's clock, divided by its nominal period.
 
-Because the two periods differ, the adapter's packets end at all phases of a tick, one phase after
-the other.
+The quotient is not 1, so packets end at all phases of a tick.
 """
 
 Handed = Iterator[tuple[float, bytes]]
@@ -110,9 +107,9 @@ def test_an_empty_read_changes_nothing() -> None:
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """The line loses a byte. In the next ten seconds, the decoder does not regard the line as calm.
+    """After a lost byte, the decoder does not regard the line as calm for ten seconds.
 
-    On a line that is not calm, the decoder needs more evidence before it accepts a frame.
+    In this time, it needs more evidence before it accepts a frame.
     """
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}

@@ -107,10 +107,9 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A «Paused» text continues the «Paused» text before it only if two conditions are true.
+    """A «Paused» text continues the one before it if nothing else came and at most nine were lost.
 
-    The board sent no other data between the two texts, and at most nine «Paused» texts were lost
-    between them. Otherwise the board may have run or restarted in between.
+    Otherwise the board may have run or restarted.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]
@@ -164,10 +163,9 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Three deltas are lost between two reads. Exactly three deltas are counted as lost.
+    """Three deltas that are lost between two reads of more than 2 s are counted as three.
 
-    Each of the two reads has more than 2 s of data, and SEQ wraps in the first one. Neither the
-    long reads nor the wrap is taken for a restart.
+    A wrap of SEQ in the first read is not taken for a restart.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
@@ -225,17 +223,16 @@ def test_stop_and_emergency_stop_are_the_manuals() -> None:
 def test_waking_is_eight_zeros_and_stop() -> None:
     """To wake the board, the driver sends eight zeros and Stop.
 
-    The zeros complete a command that was cut off. They are not letters (S, P, R), so they have no
-    other effect.
+    The zeros complete a command that was cut off, and have no other effect.
     """
     assert joined(bot().wake()) == STOP
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
-    """To start the board, the driver sends S. It may do so in every mode, because S is harmless.
+    """To start the board, the driver sends S, in every mode. S is harmless.
 
-    S alone does not change the mode. The mode changes only when data of the board show a new one.
+    S alone does not change the mode: only data of the board can do so.
     """
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"
@@ -244,7 +241,7 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """To pause a running board, the driver sends Stop and P. In any other mode, it refuses this.
+    """To pause a running board, the driver sends Stop and P. In other modes, it refuses the pause.
 
     P is a toggle, so it would start a board that does not run.
     """

@@ -54,9 +54,9 @@ def test_the_scales_are_those_of_the_settings() -> None:
 
 
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
-    """A wheel is commanded to turn at 10 rad/s. With a radius of 29 mm, its rim moves at 0.29 m/s.
+    """A frame of wheel rates (mode 2) contains the speeds of the rims.
 
-    The frame has mode 2. It contains the speed of the rim, which is 20 LSB.
+    With a radius of 29 mm, 10 rad/s is 0.29 m/s, or 20 LSB.
     """
     assert bare(encoder().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
     wide = encoder(wheel_radius_m=0.058)
@@ -72,7 +72,7 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """A velocity is so small that all its words round to zero. The driver sends Stop instead.
+    """A velocity whose words all round to zero is sent as Stop.
 
     Zeros in mode 1 would be a goal pose, the origin, if the board's switch is on "position".
     """
@@ -141,9 +141,9 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A goal is farther than 32.77 m or rad, the limit of a 16-bit word. The driver refuses it.
+    """A goal beyond 32.77 m or rad, the limit of a 16-bit word, is refused.
 
-    If the driver limited the values, the robot would drive to another place.
+    With limited values, the robot would drive to another place.
     """
     values = [0.0, 0.0, 0.0]
     values[place] = far
@@ -188,9 +188,9 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
 def test_a_frame_means_the_velocity_that_it_commands(
     typed: str, twist: tuple[float, float, float]
 ) -> None:
-    """The driver computes the commanded velocity from the bytes that it has sent to the board.
+    """The driver computes the commanded velocity from the bytes that it has sent.
 
-    If the bytes contain several frames, the last one counts. The zeros before a frame are ignored.
+    The last of several frames counts. Zeros before a frame are ignored.
     """
     found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
@@ -200,10 +200,9 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(max_examples=40, suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Apart from rounding, the velocity that is computed back from a frame is the commanded one.
+    """Except for rounding, the velocity computed back from a frame is the commanded one.
 
-    Rounding changes a word of the frame by up to 0.5 LSB. If the word would contain a harmful byte,
-    it changes by up to 1.5 LSB.
+    A word changes by up to 0.5 LSB, or by up to 1.5 LSB to avoid a harmful byte.
     """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)

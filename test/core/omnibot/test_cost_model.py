@@ -12,13 +12,9 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """Return what the decoder knows after a pose, and after the deltas that follow this pose.
+    """Return what the decoder knows after a pose with a heading of 100 mrad, and later deltas.
 
-    The pose has a heading of 100 mrad.
-
-    ``turns``: turns of the deltas, in 0.1 mrad.
-
-    ``seqs``: counters of the deltas.
+    ``turns``: turns of the deltas, in 0.1 mrad. ``seqs``: counters of the deltas.
     """
     context = NOTHING_KNOWN
     for frame in (DeltaFrame(0, 0, 0, 9), PoseFrame(0.0, 0.0, 100.0, 1)):
@@ -35,9 +31,9 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five deltas after a pose turn by 5 mrad in all. The next pose shows a different turn.
+    """A pose has a cost if it differs from the turns of the deltas by more than rounding explains.
 
-    A difference that rounding explains has no cost. A larger difference has a cost.
+    Five deltas turn by 5 mrad in all.
     """
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)
@@ -45,10 +41,9 @@ def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
 
 
 def test_a_pose_after_a_lost_delta_contradicts_nothing() -> None:
-    """After a lost delta, no heading of the next pose contradicts the deltas.
+    """After a lost delta, all headings of the next pose have the same cost.
 
-    It is unknown how far the robot turned in the lost delta. Therefore, all headings of the next
-    pose have the same cost.
+    It is unknown how far the robot turned in the lost delta.
     """
     context = after_a_cycle([10] * 5, [10, 11, 13, 14, 15])
     near, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 105.0, 2), context)

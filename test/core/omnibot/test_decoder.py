@@ -81,8 +81,7 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
     """A frame of an undamaged stream is returned as soon as its last byte arrives.
 
-    There are two exceptions. The decoder may return a frame later if its values jump, or if its
-    last byte may begin a header.
+    The decoder may wait if the frame's values jump, or if its last byte may begin a header.
     """
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
@@ -116,9 +115,9 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """A shock affects the IMU frame before a delta and the one after it. Then the line is silent.
+    """A shock before and after a delta, and then a silence, cost no frame.
 
-    The adapter delivers the second IMU frame in two parts. The decoder returns all frames.
+    The adapter delivers the IMU frame after the delta in two parts.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
@@ -145,11 +144,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """A doubtful frame is returned as soon as the first byte of the next frame arrives.
-
-    The frame is doubtful, because its last byte may begin a header. The decoder does not wait until
-    the next frame is complete.
-    """
+    """A frame whose last byte may begin a header is returned with the next frame's first byte."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -158,11 +153,9 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """The end of an IMU frame, FF FB or FF FC, could also be the header of the next frame.
+    """An IMU frame whose end looks like a header is held only in ticks in which a delta is due.
 
-    The decoder waits for more bytes only in ticks in which a delta is due. In all other ticks, it
-    returns the IMU frame at once. The pauses between the ticks show the decoder in which ticks a
-    delta is due.
+    The decoder learns these ticks from the pauses on the line.
     """
     made, waited = FrameDecoder(), []
     for tick in range(60):
@@ -184,10 +177,9 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """Decoding starts within the first 345 bytes. All frames but at most two are returned.
+    """If decoding starts at any of the first 345 bytes, at most two frames are lost.
 
-    If all bytes come at once, the test starts at each of these bytes. To save time, it starts only
-    at every 9th byte if the bytes come in ticks, and at every 23rd byte if they come one by one.
+    To save time, the slower variants start only at every 9th or 23rd byte.
     """
     ticks = ticks_of(name)[:40]
     stream = b"".join(ticks)
@@ -233,9 +225,9 @@ def test_a_robot_on_a_slope_is_not_misread_for_ever(
 
 
 def test_one_whole_text_is_enough_to_believe() -> None:
-    """At the beginning of a stream, a complete «Paused» text comes. The decoder accepts it at once.
+    """A complete «Paused» text at the beginning of a stream is accepted at once.
 
-    It does not wait for a second text, which would come only a second later.
+    The second text would come only a second later.
     """
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 

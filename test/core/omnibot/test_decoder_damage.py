@@ -109,9 +109,9 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """A random byte is inserted into a stream. At most 1 in 30 such bytes makes a false frame.
+    """At most 1 in 30 random bytes that are inserted into a stream makes a false frame.
 
-    The limit also holds for streams in which gyro values look like headers.
+    The limit also holds if gyro values look like headers.
     """
     stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)
@@ -138,10 +138,9 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """A frame has lost a byte, and the first byte of the next header seems to complete the frame.
+    """A frame that lost a byte is not completed by the first byte of the next header.
 
-    But then the second byte of this header does not fit. This shows the error to the decoder, so it
-    does not return the frame.
+    The second byte of this header shows the error.
     """
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -196,9 +195,9 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A «Paused: i» text that has lost one character is not returned, with one exception.
+    """A «Paused: i» text that has lost one character is not returned.
 
-    The decoder may return a text in which only the blank before the line feed is missing.
+    The only exception is the blank before the line feed: a text without it may be returned.
     """
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
@@ -240,9 +239,9 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """The reader is late in the middle of a frame. The next bytes wait, but none are lost.
+    """If the reader is late in the middle of a frame, no frame is lost.
 
-    The decoder completes the frame with the first of these bytes, so no frame is lost.
+    The decoder completes the frame with the bytes that have waited.
     """
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
@@ -259,10 +258,9 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """A frame ends in FF. This FF may also begin a header, so the decoder holds the frame.
+    """A frame that ends in FF is returned before the frame that comes after a silence.
 
-    Then a silence shows that the FF belongs to the held frame. The decoder returns the held frame
-    before the frame that comes after the silence.
+    The decoder holds such a frame until the silence shows that FF does not begin a header.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
@@ -285,10 +283,9 @@ def test_flush_tells_what_can_still_be_told() -> None:
 
 @pytest.mark.parametrize("frame", [REST, DeltaFrame(1, 2, 3, 4), PoseFrame(10.0, -20.0, 300.0, 5)])
 def test_flush_tells_the_only_frame_of_a_line(frame: Frame) -> None:
-    """A line carries exactly one frame. ``flush`` returns it, because nothing speaks against it.
+    """``flush`` returns the only frame of a line.
 
-    If a byte is missing or added, or if the decoder has discarded bytes before, the frame is not
-    returned. An impossible frame is not returned either.
+    It does not return a frame that is damaged or impossible, or that comes after discarded bytes.
     """
     data = encode(frame)
     for pieces in ([data], [data[index : index + 1] for index in range(len(data))]):

@@ -85,10 +85,9 @@ def test_all_frames_between_silences_come_in_any_chunks(
 @settings(max_examples=40)
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """The frames are calm: each frame is similar to the last frame of the same kind.
+    """A frame that is similar to the last one of its kind is returned with its last byte.
 
-    The decoder returns a frame as soon as its last byte arrives, unless this byte may begin a
-    header.
+    The only exception is a last byte that may begin a header.
     """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
@@ -103,10 +102,9 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """A robot in free fall sends an IMU frame with an acceleration word of -6, -5 or -4.
+    """In free fall, only an IMU frame with an acceleration word of -6 is lost.
 
-    The bytes of -6 are equal to the header of an IMU frame. So the decoder loses the frame with -6,
-    but no other frame. Above 0.5 g, the decoder does not lose a frame for this reason.
+    The bytes of -6 are those of a header. Above 0.5 g, such a frame is not lost.
     """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
@@ -139,8 +137,7 @@ def work(
 ) -> tuple[list[int], int]:
     """Return the decoder's work after each chunk, and the largest number of bytes that it held.
 
-    The list of work begins with 0. A unit of work is one byte or one edge of the search graph that
-    the decoder examines.
+    The list of work begins with 0. A unit of work is one byte or one edge of the search graph.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
@@ -180,10 +177,9 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, name: str, chunk_length: int, pause_s: float
 ) -> None:
-    """The decoder's work grows only linearly, even for a pattern of bytes that is hard to decode.
+    """The decoder's work grows only linearly, even for a repeated pattern that is hard to decode.
 
-    The stream repeats this pattern. Because the work grows linearly, the last third of the stream
-    costs about as much work as the second third. The decoder holds fewer bytes than its limit.
+    The bytes that the decoder holds stay below its limit.
     """
     stream = ADVERSARIES[name] * (THIRD // len(ADVERSARIES[name]))
     if chunk_length < THIRD:

@@ -113,8 +113,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
     """At the set rate of deltas, only the usual order of frames has no cost.
 
-    At 10 Hz, ten IMU frames come before a delta, and two deltas before a pose. At 25 Hz, four IMU
-    frames come before a delta, and five deltas before a pose.
+    At 10 Hz, a delta follows ten IMU frames, and a pose two deltas; at 25 Hz, four and five.
     """
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
@@ -138,11 +137,9 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """The rounding of the deltas does not make them contradict the next pose.
+    """A pose may differ from the deltas by the sum of their rounding errors without a cost.
 
-    Each delta is rounded by up to 0.05 mrad. If all deltas are rounded in the same direction, the
-    errors add up. A pose that differs from the deltas by the sum of these errors has no cost. A
-    pose that differs by more than twice this sum has a cost.
+    A difference of more than twice this sum has a cost.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
@@ -262,10 +259,9 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 @pytest.mark.parametrize("running", [True, False])
 @pytest.mark.slow
 def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) -> None:
-    """The driver connects to a board in IMU-only mode. The board may be paused at first.
+    """The driver recognizes IMU-only mode, also if the board is paused at first.
 
-    The driver sends the start (S) every 0.5 s, because it has not seen the board running. It
-    recognizes IMU-only mode nevertheless.
+    It sends the start (S) every 0.5 s, because it has not seen the board running.
     """
     bench = Bench(BoardSettings(imu_only=True, running=running, delta_period_s=period_s))
     bench.open()
@@ -276,8 +272,7 @@ def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) 
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
     """At any delta period, the number of discarded bytes shows how many IMU frames were lost.
 
-    Here, an IMU frame (14 bytes) and a delta (9 bytes) are damaged. The driver discards the 23
-    bytes, and counts one lost IMU frame.
+    Here, the bytes of an IMU frame (14) and a delta (9) are discarded.
     """
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)

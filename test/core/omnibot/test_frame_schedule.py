@@ -35,17 +35,17 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """The frame schedule computes the number of lost IMU frames from the number of damaged bytes.
+    """The number of lost IMU frames is computed from the number of damaged bytes.
 
-    The damaged bytes can include a delta. The schedule does not count this delta as an IMU frame.
+    A delta among these bytes is not counted as an IMU frame.
     """
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
 def test_a_damaged_pose_is_not_an_imu_frame() -> None:
-    """A pose of 15 bytes is due, but 14 damaged bytes arrive. An IMU frame has 14 bytes, too.
+    """If a pose is due, 14 damaged bytes are not counted as a lost IMU frame.
 
-    Nevertheless, the schedule does not count these bytes as a lost IMU frame.
+    A pose has 15 bytes, and an IMU frame has 14.
     """
     rhythm = nominal(0)
     for _ in range(5):

@@ -42,11 +42,9 @@ def last_count(bench: Bench) -> int:
 def test_motion_that_the_full_buffer_lost_is_in_odom_whatever_the_counter_shows(
     stall_s: float, kept: int, yaw_rates: tuple[float, float], count: int, turns: int
 ) -> None:
-    """The reader stalls for seconds while the robot drives.
+    """Motion that is lost because the kernel's buffer is full is in odom a second later.
 
-    The kernel's buffer keeps the first bytes, which arrive in one read or in three. Later bytes are
-    lost. The counter of the next delta may be small, as after a restart of the board, but the board
-    has not restarted. In all cases, odom agrees with the board's pose a second later.
+    The counter of the next delta may be small, as after a restart of the board.
     """
     bench = Bench(BoardSettings(seed=3, running=True))
     bench.open()

@@ -18,10 +18,9 @@ from omnibot_driver.core.omnibot.gaps import InterFrameGaps
     ],
 )
 def test_bytes_of_a_slow_line_take_longer(baudrate: int, pause_s: float, idle: bool) -> None:
-    """A read contains 24 bytes, which take 2.08 ms at 115200 baud and 6.25 ms at 38400 baud.
+    """The time that the line needs for the bytes of a read does not count as a pause.
 
-    The pause before this read contains the time that the line needs for these bytes. The line
-    counts as idle only if the pause is more than 4 ms longer than this time.
+    The line counts as idle if the pause is more than 4 ms longer than this time.
     """
     pauses = InterFrameGaps(10 / baudrate)
     pauses.read(pause_s, 24, 5, now=1.0)

@@ -93,10 +93,9 @@ def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """A reader that pauses once loses no frame.
+    """A reader that pauses once, after any byte of a frame, loses no frame.
 
-    The reader reads promptly for 0.5 s. Then it pauses between two bytes. The test repeats this for
-    many places of the pause, which are distributed over five frames.
+    Before the pause, it reads promptly for 0.5 s. The test tries places in five frames.
     """
     ticks = ticks_of(name)[: 62 + round(stop_s / TICK_S)]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -135,10 +134,9 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """After 24 equal frames, each read is late. No frame is lost.
+    """If each read is late, no frame is lost, whatever the frames contain.
 
-    The later frames can have any content. There is one condition: the acceleration in them is at
-    least 1 g.
+    The acceleration must be at least 1 g. Before, 24 equal frames are read in time.
     """
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
@@ -166,11 +164,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """A reader pauses within the last frame before a pause of the board.
-
-    The reader then pauses again, within the text «Paused» that the board sends next. The decoder
-    returns both the frame and the text.
-    """
+    """A frame and a «Paused» text are returned although the reader pauses within each of them."""
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"
     made = FrameDecoder()
@@ -185,10 +179,9 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter delivers pieces of 8 bytes. One piece may end a «Paused» text and begin the next.
+    """A piece that spans the silence between two «Paused» texts costs neither of them.
 
-    The board is silent between these texts, so such a piece spans a silence. Nevertheless, the
-    decoder returns all texts.
+    The adapter delivers pieces of 8 bytes.
     """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
@@ -198,10 +191,9 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The line is interrupted from the middle of one frame to the middle of a later frame.
+    """Parts of two frames are rejected if a pause is between them.
 
-    The two parts that arrive have together the length of one frame. The decoder rejects them
-    nevertheless, because there is a pause between them.
+    Together, the parts have the length of one frame.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
@@ -247,10 +239,9 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""Cases by name. In each case, two bytes of a delta have already come.
+"""Cases by name: the reads after the first two bytes of a delta.
 
-The reads bring the rest of this delta, and the frames after it. Each text is one read: the time in
-ms since the previous read, and the bytes of the read.
+Each text is one read: the time since the previous read in ms, and its bytes.
 """
 
 

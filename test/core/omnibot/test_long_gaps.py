@@ -20,11 +20,9 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """All frames are lost for more than 1 s. The first pose published after the gap is right.
+    """The first pose that is published after a gap of more than 1 s is right.
 
-    The reason: after the gap, the driver holds displacements back until the board's next pose
-    arrives. Here, this takes up to 0.2 s. So the driver can correct the first pose before it
-    publishes it.
+    The driver holds this pose for up to 0.2 s, until the board's next pose arrives.
     """
     for seed in range(5):
         on = line(seed)
@@ -43,7 +41,7 @@ def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -
 def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
     """After a long gap, the driver waits only about 0.25 s for the next pose.
 
-    Here, this pose is lost too. After the wait, the driver interpolates the motion in the gap.
+    If this pose is lost too, the motion in the gap is interpolated.
     """
     on = line(1)
     lose(on, 2.0)
@@ -59,9 +57,9 @@ def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
 @pytest.mark.parametrize("gap_s", [1.2, 5.0, 24.0])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_long_gap_that_ends_with_a_pose_is_not_bridged(gap_s: float, frame: str) -> None:
-    """The robot stops early in a long gap. A pose is the first frame after the gap.
+    """If a pose ends a long gap, odom does not continue the motion from before the gap.
 
-    Odom does not continue the motion from before the gap. The first odom after it is right.
+    The robot stops early in the gap. The first odom after the gap is right.
     """
     for seed in range(3 if gap_s < 24.0 else 1):
         on = line(seed, frame=frame)
@@ -87,8 +85,7 @@ def test_a_long_gap_that_ends_with_a_pose_is_not_bridged(gap_s: float, frame: st
 def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: int) -> None:
     """Motion in a long gap is not lost if poses arrive before the next delta.
 
-    The robot moves in the gap, and then stops. The first pose after the gap shows the motion, so
-    odom is right.
+    The first pose after the gap shows the motion.
     """
     for seed in range(3):
         on = line(seed)
@@ -103,8 +100,7 @@ def test_motion_in_a_long_gap_is_not_lost_if_poses_come_without_deltas(gap_s: in
 def test_a_pose_that_does_not_correct_continues_the_motion_for_two_seconds_at_most() -> None:
     """In a long gap, odom continues the motion for only 2 s if poses do not correct odom.
 
-    The robot drives at 0.25 m/s, and ``use_board_pose`` is off. A pose arrives after a gap of 600
-    deltas, that is 24 s. In the gap, odom continues for 2 s, that is 0.5 m.
+    ``use_board_pose`` is off. At 0.25 m/s, odom continues by 0.5 m.
     """
     odometry = attached(OdometrySettings(use_board_pose=False))
     step = DisplacementReading(0.01, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -94,10 +94,9 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
 @pytest.mark.parametrize("lose", [0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
-    """The line loses bytes, so fewer IMU frames than usual come between two deltas.
+    """Lost bytes do not make the driver advise another ``delta_period``.
 
-    A smaller number of IMU frames can mean another period of the deltas. But the driver advises
-    another ``delta_period`` only if the arrival times confirm it, so there is no advice.
+    Fewer IMU frames come between two deltas, but the arrival times do not confirm another period.
     """
     sent = sent_by(BoardSettings(running=True, delta_period_s=period_s), LONG_S)
     driver = OmniBot(OmniBotSettings(delta_period_s=period_s))

@@ -34,10 +34,9 @@ def words_of(counts: list[float]) -> tuple[int, ...]:
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """For any command, the payload contains no letter (S, P, R) and no header.
+    """The payload of a command contains no letter (S, P, R) and no header.
 
-    This matters because a board that misses a frame's header reads the payload as letters or as
-    other frames.
+    A board that misses the frame's header would obey such bytes.
     """
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
@@ -53,10 +52,9 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """In a word from -20,479 to 20,479, only the low byte can be harmful.
+    """A word with a harmful low byte is changed by one LSB, so it is off by at most 1.5 LSB.
 
-    The driver changes a word with a harmful low byte by one LSB. With the rounding, the word
-    differs from the command by at most 1.5 LSB.
+    From -20,479 to 20,479, only the low byte can be harmful.
     """
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5
@@ -78,9 +76,9 @@ def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
 def test_words_that_would_act_take_the_nearest_value_that_does_not(
     counts: tuple[float, float, float], typed: str
 ) -> None:
-    """Some bytes in a word would act as a letter, or as part of a header.
+    """Instead of a word with harmful bytes, the driver sends the nearest harmless word.
 
-    The driver sends the nearest word without such bytes. The expected bytes are typed by hand.
+    The expected bytes are typed by hand.
     """
     assert payload(*harmless(counts)) == bytes.fromhex(typed)
 
@@ -104,10 +102,9 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """The high byte of a goal's x is a letter. The driver refuses the goal.
+    """A goal whose x has a letter as its high byte is refused.
 
-    The driver does not send the nearest harmless goal instead, because this goal could be 0.26 m
-    away.
+    The nearest harmless goal could be 0.26 m away.
     """
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset if the line"):

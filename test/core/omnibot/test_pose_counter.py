@@ -18,9 +18,9 @@ def counted(deltas: int) -> Sequence:
 
 
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
-    """A pose comes after every fifth delta. The counter of a pose shows that three deltas are lost.
+    """Lost deltas that a pose's counter shows are counted with the pose, not with the next delta.
 
-    These losses are counted when the pose arrives. The next delta does not count them again.
+    A pose comes after every fifth delta. Three deltas are lost before a pose.
     """
     sequence = Sequence()
     for count in range(10):
@@ -46,10 +46,9 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 @pytest.mark.parametrize("poses", [6, 60, 206])
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
-    """Deltas are lost for more than 1 s. Then a pose arrives before the next delta.
+    """After a long gap, a pose that arrives before the next delta shows the losses, and no restart.
 
-    The pose's counter shows the losses. By chance, it may be a counter that is also possible after
-    a restart. But after such a long gap, no restart is assumed.
+    By chance, the pose's counter may also be possible after a restart.
     """
     sequence = counted(300)
     first = 300 + 5 * poses
@@ -63,10 +62,13 @@ def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> 
 def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restart(
     uptime: int, ambiguous: bool
 ) -> None:
-    """The board sends ``uptime`` deltas, is silent for 2.1 s, and then counts from zero again.
+    """A pose after a long gap is ambiguous if both counters fit a restart and also the old counts.
 
-    After 1228 deltas, both counters also continue the old ones: deltas at 1280, poses at 256.
-    After 1150 deltas, both show the restart. After 972, only the counter of the poses does.
+    The board sends ``uptime`` deltas, is silent for 2.1 s, and counts from zero again.
+
+    * 1228 deltas: ambiguous.
+    * 1150 deltas: both counters show the restart.
+    * 972 deltas: only the counter of the poses shows the restart.
     """
     sequence = counted(uptime)
     begun_s = uptime * 0.04 + 2.1
@@ -82,11 +84,10 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_begins_anew(
     number: int, restarted: bool
 ) -> None:
-    """The board sends 200 deltas. After 2.1 s, the count of a delta fits only a restart.
+    """A pose confirms a restart that a delta's count shows, if the pose's own counter is near 0.
 
-    If the counter of the next pose continues from the old one, the count of the delta may be
-    damaged. If this counter fits neither case, it shows nothing. Only a counter from zero, too,
-    shows the restart.
+    * Pose counter that continues the old one: the count of the delta may be damaged.
+    * Pose counter that fits neither case: no restart is assumed.
     """
     sequence = counted(200)
     after_s = 199 * 0.04 + 2.1
@@ -96,9 +97,9 @@ def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_b
 
 @pytest.mark.parametrize("lost", [1300, 2600])
 def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(lost: int) -> None:
-    """More than 256 poses are lost, so the counter of the poses wraps. The gap lasts over 51.2 s.
+    """The first pose after a gap in which the pose counter wraps does not show a restart.
 
-    The next pose is not taken for the first one after a restart.
+    More than 256 poses are lost, in over 51.2 s.
     """
     sequence = counted(50)
     for count in range(50 + lost, 60 + lost):
@@ -124,10 +125,9 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """The board restarts, 3 s before its counter would have wrapped to 0.
+    """A doubtful count 0 of a delta is a restart if the pose after it also has the count 0.
 
-    By the time, the first count after the restart is a little too high for a wrap, so it is
-    doubtful. But the pose directly after it also begins at 0. No delta is counted as lost then.
+    No delta is then counted as lost.
     """
     sequence = Sequence()
     for count in range(171):
@@ -147,10 +147,9 @@ def reopened() -> Sequence:
 
 
 def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
-    """The port is closed and opened again, and the board has restarted in the meantime.
+    """The pose counter also shows a restart that happened while the port was closed.
 
-    By chance, its count 0 fits the last count and the elapsed time. The counter of the next pose
-    shows the restart, as it does while the port stays open.
+    By chance, the delta's count 0 fits the last count and the elapsed time.
     """
     sequence = reopened()
     after_s = 205 * 0.04 + 2.0
@@ -174,10 +173,9 @@ def test_the_pose_counter_goes_on_while_the_port_is_closed(lost: int) -> None:
 
 @pytest.mark.parametrize("first", range(900, 1200, 50))
 def test_after_an_hour_the_pose_counter_does_not_tell_of_a_restart(first: int) -> None:
-    """The port is closed for an hour, and the board goes on. Its clock is slow by 0.3 %.
+    """After an hour with a closed port, the pose counter does not show a restart.
 
-    So the driver does not know how often the counter of the deltas has wrapped. The counter of the
-    poses then does not fit, which is not taken for a restart.
+    The board's clock is slow by 0.3 %, so the number of wraps of the delta counter is unknown.
     """
     sequence = Sequence()
     for count in [*range(first, first + 206), *range(first + 90_000, first + 90_050)]:
@@ -190,9 +188,9 @@ def test_after_an_hour_the_pose_counter_does_not_tell_of_a_restart(first: int) -
 
 
 def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> None:
-    """The board restarts while the port is closed, and a pose is the first frame that arrives.
+    """A pose that is the first frame after a reconnection shows no losses.
 
-    The difference of the pose counters means nothing, so the pose contains no known losses.
+    The board has restarted, so the difference of the pose counters means nothing.
     """
     sequence = reopened()
     assert sequence.pose(3, 205 * 0.04 + 60.0).lost == 0
@@ -201,10 +199,9 @@ def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> No
 def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_earlier_losses() -> (
     None
 ):
-    """The port is closed for 1 s. It opens in the middle of a delta, so a pose arrives first.
+    """A pose that is the first frame after a reconnection does not lead to a false restart later.
 
-    The counter of this pose is ignored. The next delta shows how many deltas were lost. The second
-    pose is lost. The counter of the third pose agrees with the deltas, so no restart is assumed.
+    The counter of this pose is ignored, and the next delta shows the losses.
     """
     sequence, restarts = Sequence(), []
     for count in [*range(25), *range(49, 75)]:
@@ -231,18 +228,18 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """The board's pose counter begins at 0 again, after only 1 s. No losses are counted.
+    """A pose counter that begins at 0 again after only 1 s shows no losses.
 
-    The counter has not wrapped, because a wrap needs more poses than the board sends in 1 s.
+    For a wrap, the board would need more time.
     """
     sequence = counted(25)
     assert sequence.pose(0, 25 * 0.04 + 1.0) == Step(0)
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """A delta is lost. The next pose and the next delta are decoded late, almost at the same time.
+    """A loss that a pose shows is not counted again with the next delta.
 
-    The loss is counted when the pose arrives. The next delta does not count it again.
+    The pose and the delta are decoded late, almost at the same time.
     """
     sequence = Sequence()
     for count in range(11):

@@ -41,10 +41,9 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """After a pause, the board continues with the next count. No delta is counted as lost.
+    """The next count after a pause shows no loss. The duration of its delta is unknown.
 
-    The duration of the delta with this count is unknown. If the count is 0 (after 255), the driver
-    assumes a restart, because a restarted board begins at 0.
+    The count 0 is taken for a restart, because a restarted board begins at 0.
     """
     sequence = begun(count)
     sequence.pause()
@@ -56,10 +55,9 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """After a pause, either the board has restarted, or it has continued and deltas were lost.
+    """After a pause, only the next count, if it is not 0, shows that the board has not restarted.
 
-    No count shows which case it is, if the first deltas were lost. So the driver suspects a
-    restart, and the board's pose decides. Only the next count shows that the board has continued.
+    After any other count, the driver suspects a restart, and the board's pose decides.
     """
     sequence = Sequence()
     for number in range(11):
@@ -126,10 +124,9 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 
 @pytest.mark.parametrize("wraps", [0, 1, 3])
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
-    """A false delta has a count near zero, as after a restart.
+    """A supposed restart is withdrawn when the next delta continues the old count.
 
-    The next true delta continues the old count. This shows that the board has not restarted, even
-    if the counter has wrapped in between. The supposed restart is withdrawn.
+    A false delta had a count near zero. The counter may have wrapped in between.
     """
     sequence = begun(88)
     passed = 1 + 256 * wraps
@@ -139,9 +136,9 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnect, the line leads to another board, so the next count can be any number.
+    """After a reconnection to another board, the result is the same as after a restart.
 
-    The result is the same as for a restart, although this count is too high for a restarted board.
+    The next count can be any number, even one that is too high for a restarted board.
     """
     sequence = begun(7)
     sequence.reconnect()
@@ -149,9 +146,9 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """A false delta comes too early. The true delta, with the same count, follows.
+    """A repeated count does not show a wrap, so no delta is counted as lost.
 
-    The repeated count does not mean that the counter has wrapped. So no delta is counted as lost.
+    A false delta comes too early. The true delta, with the same count, follows.
     """
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)

@@ -193,9 +193,10 @@ def test_a_count_that_begins_anew_has_not_grown() -> None:
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """The computer is busy, so the reader reads late. If nothing is lost, the status is OK.
+    """A reader that waits for the processor is not reported as a bad line.
 
-    If too few readings arrive, the status names the busy computer, not a bad line.
+    If nothing is lost, the status is OK. If too few readings arrive, the status names the busy
+    computer.
     """
     robot = Robot()
     for second in range(12):
@@ -212,9 +213,9 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
-    """The clock skew is larger than that of any crystal. The driver reports this only after 70 s.
+    """A clock skew that is larger than that of any crystal is reported only after 70 s.
 
-    It waits, because a busy computer may cause an equally large skew for a minute.
+    A busy computer may cause such a skew for a minute.
     """
     robot = Robot()
     robot.set(skew_ppm=-119.0)
@@ -262,9 +263,9 @@ def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str,
 
 
 def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
-    """A board has just begun to send data. The diagnostics do not report that a rate is too low.
+    """When a board has just begun to send data, no rate is reported as too low.
 
-    They compute a rate only from data that came in the board's current state.
+    A rate is computed only from data that came in the board's current state.
     """
     robot = Robot()
     robot.set(state="paused")

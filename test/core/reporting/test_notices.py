@@ -25,11 +25,7 @@ def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_cam
 
 
 def test_an_overrun_of_the_port_is_blamed_only_for_frames_lost_at_about_its_time() -> None:
-    """The port overruns, and an hour later frames are lost. The notice is not about the overrun.
-
-    Then frames are lost at about the time of another overrun. This notice names the overrun as the
-    cause.
-    """
+    """Only frames lost at about the time of an overrun of the port are blamed on this overrun."""
     notices, none = Notices(), Refused(0, 0, 0)
     assert notices.counted(0, 0, none, 100.0) == []
     assert notices.counted(0, 1, none, 100.1) == []

@@ -17,9 +17,8 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: functions of the number of a tick. ``above`` returns the upper bound of
-    the tick's time minus the true time, in s. ``below`` returns the lower bound minus the true
-    time.
+    ``above``, ``below``: for the number of a tick, the upper and lower bound of its time minus the
+    true time, in s.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
@@ -42,9 +41,9 @@ def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> N
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """Each tick has a lower bound 0.1 ms before its true time and an upper bound 0.8 ms after it.
+    """The fitted clock is near the middle of two close bounds, 0.3 ms after the true time.
 
-    The fitted clock is near the middle of these bounds, about 0.3 ms after the true time.
+    The bounds are 0.1 ms before and 0.8 ms after the true time.
     """
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
@@ -83,10 +82,10 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """For 4 s, reads are slightly late. Their lower bounds are wrong: later than the true times.
+    """Lower bounds that contradict upper bounds are discarded.
 
-    These lower bounds contradict the upper bounds of the other reads. An upper bound is always
-    right, because no read comes before its tick. So the fit discards the lower bounds.
+    An upper bound is always right, because no read comes before its tick. Late reads give wrong
+    lower bounds.
     """
     _, late_s = followed(
         0.0,

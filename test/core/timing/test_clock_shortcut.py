@@ -81,8 +81,8 @@ surprises = st.tuples(
 )
 """Unusual reads, each followed by normal reads.
 
-Each element has five parts: the list of readings in the unusual read, the ticks since the previous
-read, the delay in s, a ``SampleBoundary`` or None, and the number of normal reads that follow.
+Each element: the readings of the unusual read, the ticks since the previous read, the delay in s, a
+``SampleBoundary`` or None, and the number of normal reads.
 """
 
 
@@ -110,8 +110,7 @@ def test_surprises_are_stamped_alike(
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """If ticks arrive on time, the clock uses its shortcut for more than 90 % of the reads.
 
-    The other tests compare stamps with and without the shortcut. They would prove nothing if the
-    shortcut were hardly ever used.
+    Otherwise, the comparisons of stamps with and without the shortcut would prove nothing.
     """
     compared = 0
     compare = DeviceClock._compare

@@ -12,9 +12,9 @@ from omnibot_driver.core.requests import Request
 
 
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
-    """The board is paused at first, and sends only its «Paused» text, which has no sampling time.
+    """If the board is paused at first, the sum of the delays is still a finite number.
 
-    The text adds nothing to the sum of the delays. So the sum stays a finite number.
+    The «Paused» text has no sampling time, and adds nothing to the sum.
     """
     bench = Bench()
     bench.open()

@@ -114,8 +114,7 @@ def test_stamps_are_even_and_true_to_a_constant(
 ) -> None:
     """From 2 s on, the steps between stamps differ from 10 ms by less than 0.2 ms (RMS).
 
-    All stamps may have the same error. Apart from this constant error, 99 % of them are right
-    within 0.5 ms.
+    Apart from a constant error, 99 % of the stamps are right within 0.5 ms.
     """
     stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, 0)
     assert stamped.unevenness() < 0.2e-3
@@ -127,9 +126,9 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """An adapter sends every 16 ms, while the board's tick is 10 ms. The stamps are right.
+    """The stamps are right if an adapter sends every 16 ms, while the board's tick is 10 ms.
 
-    If the clock used only arrival times, its stamps could be 0.8 ms late for seconds.
+    Stamps from arrival times alone could be 0.8 ms late for seconds.
     """
     stamped = run(Board(seconds=90, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
@@ -240,9 +239,9 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """A board restarts, so its ticks have another phase, and SEQ is different. The stamps increase.
+    """After a restart of the board, the stamps increase, with the same offset from the true times.
 
-    All stamps have the same constant offset from the true times, before the restart and after it.
+    The ticks have another phase, and SEQ is different.
     """
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
@@ -257,7 +256,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 @pytest.mark.parametrize("period_s", [0.01, 0.2])
 def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> None:
-    """A damaged text line arrives a second before the first frames. It does not start the clock.
+    """A damaged text line, a second before the first frames, does not start the clock.
 
     The stamps of the first frames are right, even if the host reads only five times a second.
     """
@@ -272,9 +271,9 @@ def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> Non
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """The board is silent for five seconds, but its counter SEQ does not show this silence.
+    """The arrival times show a silence of five seconds that the counter SEQ does not show.
 
-    The arrival times show it. So the fitted clock starts again, and the stamps are right.
+    The fitted clock starts again, and the stamps are right.
     """
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
@@ -297,9 +296,9 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """A false displacement arrives among true ones. It looks as if the board had restarted.
+    """A false displacement that looks like a restart of the board does not disturb the clock.
 
-    This does not disturb the clock: the stamps of the samples stay 10 ms apart.
+    The stamps of the samples stay 10 ms apart.
     """
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
@@ -334,10 +333,9 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Reads have any counters and any ``SampleBoundary``, even wrong ones.
+    """Stamps never decrease, and never exceed arrival times, even if counters are wrong.
 
-    (A ``SampleBoundary`` says where a read ends in the stream of samples.) Stamps never decrease,
-    and never exceed arrival times.
+    A ``SampleBoundary``, which says where a read ends in the stream of samples, may be wrong, too.
     """
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf

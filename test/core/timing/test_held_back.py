@@ -18,12 +18,9 @@ HELD = 4095
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
-    """Let a robot drive, and let an adapter then hold back all data for a time. Return the bench.
+    """Let a robot drive, and an adapter hold back all data for ``ticks`` ticks; return the bench.
 
-    After this time, the adapter delivers the data in its buffer, and the bench runs for two more
-    seconds.
-
-    ``ticks``: number of ticks for which the adapter holds back the data.
+    The adapter then delivers the data in its buffer, and the bench runs for two more seconds.
     """
     bench = Bench(BoardSettings(frame=frame))
     bench.open()
