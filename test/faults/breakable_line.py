@@ -62,7 +62,7 @@ def gaining(rate: float, random: Random) -> Damage:
 def noise(random: Random) -> Damage:
     """Return a function that replaces all bytes by random ones, as a wrong baud rate does.
 
-    The function ignores its argument: it returns as many bytes as the line can carry in a tick.
+    The function ignores its argument, and returns as many bytes as fit into a tick.
     """
     return lambda _data: random.randbytes(BYTES_PER_TICK)
 

@@ -30,16 +30,16 @@ TRANSIT: Final = 200
 The board has sent these frames already, but the driver may publish them after the beginning.
 """
 REACH: Final = 200
-"""Number of sent frames that are compared with one published message. They are the next frames
-after the one that matched the previous message. If no frame equals the message, the message is
-wrong."""
+"""Number of sent frames, after the last match, with which a published message is compared.
+
+If no frame equals the message, the message is wrong.
+"""
 
 
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    A busy computer does not slow down the board and the adapter. So if this thread is delayed, it
-    then delivers all bytes together that arrived during the delay.
+    If this thread is delayed, it then delivers all bytes together that arrived during the delay.
 
     ``silent_s``: the longest time between two deliveries so far, in s.
     """
@@ -124,9 +124,7 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages match no frame, and how many frames are skipped between matches.
 
-    Messages and frames are compared in order, beginning at a frame that equals the first message.
-    If several frames equal it, all of them are tried as the beginning. The result with the fewest
-    errors is returned.
+    The comparison begins at the frame, equal to the first message, that gives the fewest errors.
     """
     starts = [n for n, key in enumerate(sent) if published and same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

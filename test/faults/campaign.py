@@ -204,12 +204,9 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test how the robot stops if the line loses bytes on the way to the board.
 
-        The line continues to lose bytes during all stops.
+        ``number_of_life``: index in ``LIVES`` of the series of stops that each driver carries out.
 
-        ``number_of_life``: index of a group in ``LIVES``. A group is a series of stops. Each driver
-        carries out the whole series.
-
-        ``numbers``: one number for each driver. The number selects which bytes are lost.
+        ``numbers``: one number for each driver, which selects the lost bytes.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

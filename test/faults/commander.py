@@ -13,8 +13,10 @@ from std_srvs.srv import SetBool
 
 DRIVE_HZ: Final = 20.0
 FAR_M: Final = 10.0
-"""Distance in m from the robot to a goal that stands for a command of 1 m/s. For other commands,
-the distance is proportional to the commanded speed. No test drives far enough to reach a goal."""
+"""Distance in m from the robot to the goal for a command of 1 m/s; proportional to the speed.
+
+No test drives far enough to reach a goal.
+"""
 
 
 class Hand(Protocol):

@@ -60,10 +60,11 @@ class Ending:
 
     ``late_s``: additional time within which the driver's process must end, in s.
 
-    ``full``: whether the driver's port is full of old commands. The robot may then drive longer.
+    ``full``: whether the driver's port is full of old commands.
 
-    ``read``: whether the driver ends only when it reads data again. The robot may then drive
-    longer.
+    ``read``: whether the driver ends only when it reads data again.
+
+    In the last two cases, the robot may drive longer.
     """
 
     end: Callable[[Rig], object]
@@ -134,7 +135,7 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
     """Plug in the cable again, and send SIGINT before the driver has opened the port.
 
-    The robot still carries out its last command. The driver must stop the robot, and then end.
+    The robot still carries out its last command.
     """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")

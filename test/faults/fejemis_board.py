@@ -2,8 +2,7 @@
 
 """The Fejemis in the fault campaign: two ports, lines of text with checksums, one robot.
 
-The campaign does not compare the published messages with the data from the boards, because the two
-boards send at different rates.
+Published messages are not compared with data from the boards, which send at different rates.
 """
 
 import re
@@ -90,8 +89,8 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy (``half``) has the fault ``what`` while the robot drives.
 
-    ``allowed_s``: time in s within which the robot must stop, although commands continue. 0 means
-    that the robot need not stop before the end of the fault.
+    ``allowed_s``: time in s within which the robot must stop although commands continue; 0 if it
+    need not stop during the fault.
     """
 
     def case(rig: Rig) -> None:

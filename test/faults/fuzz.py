@@ -23,7 +23,7 @@ BURST: Final = 10
 HELD: Final = 0.99
 """Least share of the board's IMU frames that the driver must publish.
 
-The share is computed for the time from the beginning of the random input until 2 s after its end.
+The share covers the time from the beginning of the random input until 2 s after its end.
 """
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 

@@ -2,8 +2,7 @@
 
 """The LOIS ECU in the fault campaign: lines of text, two wheels, no IMU.
 
-The campaign does not compare the published messages with the data from the board. The driver
-predicts odometry, so a message need not be equal to any report of the board.
+Published messages are not compared with the board's reports, because the driver predicts odometry.
 """
 
 from typing import Final

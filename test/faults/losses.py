@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops of the robot while the line loses bytes on the way to the board.
+"""Stops of the robot while the line loses bytes on the way to the board, in real time.
 
-The line continues to lose bytes until the end of the test, also when the robot must be at rest.
-The stops run in real time. In simulated time, test/integrity/outbound.py measures the rate of
-failures.
+The losses continue until the end of the test. In simulated time, test/integrity/outbound.py
+measures the rate of failures.
 """
 
 import signal

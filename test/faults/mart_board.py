@@ -2,8 +2,7 @@
 
 """The MART controller in the fault campaign. It sends only replies, and its moves block it.
 
-In some cases of the campaign, the network is worse than the driver assumes. The names of these
-cases begin with "beyond what is assumed".
+In the cases "beyond what is assumed", the network is worse than the driver assumes.
 """
 
 import socket
@@ -57,10 +56,9 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty, in place of the bytes that the board has received.
+        """Always empty, so that the campaign does not check the last bytes that the board received.
 
-        For other boards, the campaign checks that the last received bytes are a stop. This check
-        must not be made for a MART, because its driver still sends queries after its last stop.
+        The driver of a MART still sends queries after its last stop.
         """
         return b""
 
@@ -203,10 +201,9 @@ def another_client(said: bytes, rig: Rig) -> None:
 
 
 def imu_dies(rig: Rig) -> None:
-    """Let the IMU fail while the robot drives by the command RM, which starts both motors.
+    """Let the IMU fail while the robot drives by the command RM. The robot must stop.
 
-    The robot must stop. The controller's server hangs after this stop, so this function finally
-    restarts it.
+    The controller's server hangs after this stop, so this function finally restarts the server.
     """
     rig.drive()
     rig.wait_ticks(100)

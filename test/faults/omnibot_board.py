@@ -46,10 +46,9 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Return the settings of one of the boards that are tested behind a line that loses bytes.
+    """Return the settings of the board with this number, for a line that loses bytes.
 
-    ``number``: number of the board. The number selects a receiver (the board's way to find frames),
-    and whether the board obeys an emergency stop.
+    ``number``: selects the receiver, and whether the board obeys an emergency stop.
     """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)

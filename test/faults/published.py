@@ -2,8 +2,7 @@
 
 """Compares published messages with the frames that the board sent.
 
-To compare a message with a frame, the module converts each of them to a *key*. A key has the values
-in the units of the frame.
+Messages and frames are converted to *keys*, which have the values in the units of the frame.
 """
 
 import math
@@ -39,7 +38,7 @@ def sent_imu_key(frame: bytes) -> Key | None:
 def odom_key(message: Odometry) -> Key | None:
     """Return the speed in 0.1 mm per 40 ms, and the yaw rate in 0.1 mrad per 40 ms.
 
-    These two do not depend on the robot's heading. If they were not measured, return ``None``.
+    Return None if the twist was not measured. The key does not depend on the robot's heading.
     """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE

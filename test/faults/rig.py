@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A rig for tests of faults, with checks of the robot and of the driver.
+"""A rig for tests of faults: a real driver process, a faulty line to the board, and a commander.
 
-The rig runs a real driver process, a line to the board with faults, and a commander. The commander
-sends motion commands.
+The rig checks the robot and the driver. The commander sends motion commands.
 """
 
 import math
@@ -216,8 +215,8 @@ class Rig:
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
         """Expect the motors to be off soon after ``since_tick``, and to stay off for ``rest_s``.
 
-        ``allowed_s``: longest time from ``since_tick`` to standstill. The ``grace_s`` of the rig is
-        added to this time.
+        ``allowed_s``: longest time from ``since_tick`` to standstill, without the rig's
+        ``grace_s``.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)
@@ -284,10 +283,9 @@ class Rig:
     def judge_stream(self, damaged_bytes: bool = False) -> None:
         """Expect that the driver has published only what the board sent.
 
-        Also expect that odometry does not jump, timestamps increase, and no reading is rejected.
+        Odometry must not jump, timestamps must increase, and no reading may be rejected.
 
-        ``damaged_bytes``: whether the line damages bytes. If so, a few wrong messages and rejected
-        readings are allowed.
+        ``damaged_bytes``: whether a few wrong messages and rejected readings are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

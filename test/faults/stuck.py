@@ -20,11 +20,9 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
     After this delivery, the robot must be at rest.
 
-    ``seconds``: the time for which the driver gets commands. The adapter holds the data for 1 s
-    longer than that.
+    ``seconds``: time for which the driver gets commands. The adapter holds the data for 1 s longer.
 
-    ``mute``: whether the driver gets no data from the board while the adapter holds the driver's
-    data.
+    ``mute``: whether the driver gets no data from the board in this time.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -57,10 +55,10 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full for so long that the driver closes it and opens it again, more than once.
+    """Keep the port full until the driver has closed and opened it again more than once.
 
-    The driver must report only once that the port accepts no data. When the port accepts data
-    again, the robot must come to rest.
+    The driver must report the full port only once. When the port accepts data again, the robot must
+    come to rest.
     """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)

@@ -37,9 +37,9 @@ def goals(
 def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
     case: Callable[[GoalRig], None], goals: GoalRig
 ) -> None:
-    """During a drive to a goal, an event such as a cut cable makes the driver discard the goal.
+    """After an event such as a cut cable, the goal is discarded and never sent again.
 
-    The driver never sends this goal again. A new goal moves the robot.
+    A new goal moves the robot.
     """
     case(goals)
     goals.expect_obeys_again()

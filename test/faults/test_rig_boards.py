@@ -14,8 +14,7 @@ from walk import CALLS, steps_of
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
     """Every board has at least one fault that the campaign injects.
 
-    The board's ``without`` names what the campaign leaves out. Each of these names exists, as a
-    fault or as a part of the campaign.
+    The board's ``without`` names only faults and parts of the campaign that exist.
     """
     kind = load(board)
     own = (kind.cases or survivable)(0)

@@ -2,9 +2,8 @@
 
 """Faults in random order, several of them at the same time, while random commands move the robot.
 
-Every few steps there is a break, in which the robot must come to rest. In the break, the commands
-and most faults end. Only the damage to bytes on the way to the board continues at first. Then this
-damage ends too, and the robot must obey a new command.
+Every few steps, most faults end and the robot must come to rest, even if bytes to the board are
+still damaged. Then all faults end, and the robot must obey a new command.
 """
 
 from collections.abc import Callable
@@ -21,8 +20,7 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-A driver that had no data does not know whether the robot moves. It can act only after it has
-received measurements. For this reason, the time is longer than the command timeout.
+It is longer than the command timeout, because a driver without data must first get measurements.
 """
 
 

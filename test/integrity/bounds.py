@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The limits for the errors of a parser, and the streams on which the report checks them.
+"""The limits for a parser's errors, and the streams on which the report checks these limits.
 
-A *chunking* is a way in which the computer reads a stream in pieces. The *plain* parser decodes
-without checks, for comparison with the driver's parser.
+A *chunking* is a way to read a stream in pieces. The *plain* parser, for comparison, decodes
+without checks.
 """
 
 from dataclasses import dataclass
@@ -23,15 +23,13 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 class Bound:
     """The limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``: the number N in "at most one decoded frame in N may be wrong". None:
-    every decoded frame must be right. This limit is for chunkings that show the line's idle gaps to
-    the parser.
+    ``one_wrong_in_visible``: N in "at most one decoded frame in N may be wrong", for chunkings that
+    show the line's idle gaps. None: every decoded frame must be right.
 
     ``one_wrong_in_hidden``: the same number for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of the intact frames that must be decoded. 1.0: every intact frame
-    after the first two must be decoded. For the chunkings in ``BUSY_LOOPS``, a share of 99.9 % is
-    enough.
+    ``delivered``: least share of the intact frames that must be decoded. 1.0: all of them after the
+    first two; 99.9 % for the chunkings in ``BUSY_LOOPS``.
 
     ``chunkers``: names of the chunkings that have these limits.
     """
@@ -52,8 +50,7 @@ class Bound:
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded with this chunking.
 
-        The share is ``delivered``. For a chunking in ``BUSY_LOOPS``, it is at most 99.9 %, because
-        both its adapter and its reader are late.
+        It is at most 99.9 % for ``BUSY_LOOPS``, where both the adapter and the reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

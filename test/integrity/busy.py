@@ -2,9 +2,10 @@
 
 """A busy computer: the line is undamaged, but the reading process runs late.
 
-An adapter delivers bytes in *pieces*. A late reader may get several pieces in one read, or only a
-part of a piece. A *chunker* is a function that returns the reads: for each read, the index after
-its last byte, and the time in s.
+An adapter delivers bytes in *pieces*. A late reader may get several pieces in one read, or a part
+of one.
+
+A *chunker* returns the reads: for each read, the index after its last byte, and the time in s.
 """
 
 from bisect import bisect_right
@@ -140,10 +141,10 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of changing kinds to a late reader.
+    """Deliver pieces of randomly changing kinds to a late reader.
 
-    The kind changes at random: single bytes, a few bytes, bursts or packets. In each read, the late
-    reader takes all bytes that have arrived, or some of them.
+    The kinds are single bytes, a few bytes, bursts and packets. Each read takes all or some of the
+    bytes that have arrived.
     """
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []

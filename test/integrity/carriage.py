@@ -122,10 +122,9 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes.
+    """Deliver pieces of 1 to 8 bytes, even if the line is idle within a piece.
 
-    The line may be idle between two bytes of a piece. But the first and the last byte of a piece
-    are at most 16 ms apart, because an adapter holds no byte for longer.
+    A piece lasts at most 16 ms, because an adapter holds no byte for longer.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):

@@ -67,8 +67,8 @@ def row(
 ) -> None:
     """Print a row of the table: the shortest and the longest reaction time.
 
-    The reaction time depends on the tick, between two displacements, at which the motion begins. So
-    the function measures one reaction time for each of these ticks.
+    The function measures one time for each tick, between two displacements, at which the motion can
+    begin.
     """
     shown = []
     for period_s in PERIODS_S:

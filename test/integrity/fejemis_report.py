@@ -34,10 +34,9 @@ SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""For each fault, two limits, which apply to lines with checksums.
+"""For each fault on lines with checksums: the least share of values to publish, and N.
 
-The first limit is the least share of the values that must be published. The second limit is N: at
-most one value in N may be wrong. N = 0 means that no value may be wrong.
+At most one value in N may be wrong. N = 0 means that no value may be wrong.
 """
 ASTRAY_M: Final = 0.02
 
@@ -49,11 +48,9 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``: number of values that the session on undamaged lines publishes.
+    ``sent``, ``out``: number of values from undamaged and from damaged lines.
 
-    ``out``: number of values that the session on damaged lines publishes.
-
-    ``wrong``: number of wrong values that the session on damaged lines publishes.
+    ``wrong``: number of wrong values from damaged lines.
 
     ``odometry``: number of compared odometry messages.
 
@@ -151,10 +148,9 @@ def value_of(event: Event) -> str | None:
 
 
 def score(truth: list[Event], found: list[Event]) -> Score:
-    """Compare the events of a session on damaged lines with those of one on undamaged lines.
+    """Compare events from damaged lines (``found``) with events from undamaged lines (``truth``).
 
-    ``truth``: events on undamaged lines. ``found``: events on damaged lines. If ``found`` has a
-    value more often than ``truth``, the additional ones count as wrong.
+    A value that ``found`` has more often than ``truth`` counts as wrong.
     """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))

@@ -15,15 +15,14 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-The judge searches the true frames forward for one that equals the decoded frame. If it skips more
-intact frames than this number, the two frames may be equal by chance. Then the judge also searches
-for the next decoded frame of the same read, after the found frame. If this search skips more than
-this number too, the decoded frame is wrong. If the read has no next decoded frame, the decoded
-frame is accepted.
+If the judge must skip more to find a frame that equals the decoded one, the match may be chance.
+The decoded frame is then wrong if the next one in the same read also needs too large a skip.
 """
 REACH_BYTES = 600
-"""Start of the search for the true frames that match a read. The search begins this number of
-received bytes before the read, and then another 300 bytes earlier in the true stream."""
+"""Start of the search for the frames of a read: this number of received bytes before the read.
+
+From there, the search begins 300 bytes earlier in the true stream.
+"""
 
 
 @dataclass(slots=True)

@@ -2,9 +2,8 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board shares no code with the driver. The *true* reports are those that are decoded
-from the undamaged stream. The reports from a damaged stream are matched with equal true reports, in
-the same order. A report without a match is wrong.
+The *true* reports are those from the undamaged stream. A report from a damaged stream is wrong if
+it matches no true report in the same order. The simulated board shares no code with the driver.
 """
 
 from collections import Counter

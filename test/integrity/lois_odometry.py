@@ -3,10 +3,17 @@
 """Errors of the odometry of a LOIS ECU, and NEES, in many simulated drives.
 
 ``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. Seeds below 4000
-were used for tuning. ``--nominal``: the wheels have the assumed size. ``--gains boot``: the
-controllers keep the board's gains. ``--late``: the computer reads only once in 0.05 to 0.35 s.
-``--loss 0.01``: one byte in a hundred is lost, in either direction. ``--own-periods``: the board
-keeps the period that it has after a boot, 400 ms instead of 200 ms.
+were used for tuning.
+
+``--nominal``: the wheels have the assumed size.
+
+``--gains boot``: the controllers keep the board's gains.
+
+``--late``: the computer reads only once in 0.05 to 0.35 s.
+
+``--loss 0.01``: one byte in a hundred is lost, in either direction.
+
+``--own-periods``: the board keeps its period after a boot, 400 ms instead of 200 ms.
 """
 
 import argparse

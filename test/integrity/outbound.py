@@ -2,11 +2,12 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-In each simulated trial, a damaged line carries the driver's bytes, and a receiver on the board
-interprets them. The report counts the receiver's errors.
+In simulated trials, a damaged line carries the driver's bytes to a receiver, whose errors are
+counted. The exit code is 1 when a receiver misses a bound.
 
-``--share``: run only this share of the trials, and write nothing. ``--examples``: show bytes that
-led to errors. The exit code is 1 when a receiver misses a bound.
+``--share``: run only this share of the trials, and write nothing.
+
+``--examples``: show bytes that led to errors.
 """
 
 import argparse

@@ -2,9 +2,8 @@
 
 """What the driver writes in a scene, which is a script of commands and requests.
 
-The writes in a scene depend only on the states that the board reports. A ``Course`` has the writes
-for one sequence of states. The writes of a course are computed once, and used in all trials of the
-scene in which the board reports this sequence.
+The writes depend only on the states that the board reports. A ``Course`` has the writes for one
+sequence of states, computed once for all trials with this sequence.
 """
 
 from dataclasses import dataclass
@@ -23,13 +22,14 @@ class Understood:
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the first later write that is special. If there is
-    none, it is the number of writes. A write is special in three cases:
+    ``alike_until``: for each write, the index of the next special write; the number of writes if
+    there is none.
+
+    A write is special in three cases:
 
     * It begins or ends a motion.
     * The line is still sending an earlier write.
-    * The receiver does not understand exactly the control frames in the write, for example because
-      the write contains a letter.
+    * The receiver does not understand exactly the control frames in the write.
     """
 
     held: list[bytes]

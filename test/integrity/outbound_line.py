@@ -16,9 +16,8 @@ CHANGED: Final = -2
 Arrival = tuple[int, float, int]
 """A byte that arrives: its value, its place, and its origin.
 
-The place is the position of the byte in the write. An added byte has a place between the positions
-of two written bytes, such as 3.5. The origin of an undamaged byte is its position in the write. The
-origin of any other byte is ``ADDED`` or ``CHANGED``.
+The place is the position in the write; for an added byte, it is between two positions, such as 3.5.
+The origin is the position in the write, or ``ADDED`` or ``CHANGED``.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 
@@ -26,9 +25,8 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes before the next fault. A write of at most this length arrives
-    undamaged. For such a write, the caller may subtract the length from ``whole`` and not call
-    ``carry``. For a longer write, the caller must call ``carry``.
+    ``whole``: number of bytes before the next fault. For a write of at most this length, the caller
+    may subtract the length from ``whole`` instead of calling ``carry``.
     """
 
     whole: int

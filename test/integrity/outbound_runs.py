@@ -25,10 +25,9 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. The commands differ from script to script."""
 NEEDED: Final = 10_000
-"""Least number of trials for each kind of receiver and each rate of lost bytes.
+"""Least number of trials that end a drive, for each kind of receiver and rate of lost bytes.
 
-This number is the total of all scenes that end a drive. With 1 byte in 100 lost, each of the three
-scenes in ``HURRIES`` alone has at least this number of trials.
+With 1 byte in 100 lost, each of the scenes in ``HURRIES`` alone has at least this number.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -57,8 +56,7 @@ Scores = dict[tuple[str, str, str], Score]
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
     """Yield a name and a kind of board, for each kind on which a scene runs.
 
-    All kinds have the receiver ``receiver``. Several kinds can have the same name. The scores of
-    kinds with the same name are added.
+    All kinds have the receiver ``receiver``. The scores of kinds with the same name are added.
     """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
@@ -83,10 +81,11 @@ def one(
 ) -> tuple[Scores, int]:
     """Run one script with each fault on all boards.
 
-    Return the scores, and how many times the session of the driver was run for them.
+    Return the scores, and the number of runs of the driver's session.
 
-    ``share``: the number of trials, as a share of the usual number. ``job``: name and seed of the
-    scene.
+    ``share``: share of the usual number of trials.
+
+    ``job``: name and seed of the scene.
     """
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))
@@ -115,11 +114,9 @@ def add(total: Scores, more: Scores) -> None:
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
     """Return the sum of the scores of the fault ``fault``.
 
-    ``receiver``: the receiver whose scores are added. If empty, the scores of all receivers are
-    added.
+    ``receiver``: empty for all receivers.
 
-    ``scene``: the scene whose scores are added. If empty, the scores of all scenes except
-    ``DRIVES`` are added.
+    ``scene``: empty for all scenes except ``DRIVES``.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():
@@ -132,10 +129,11 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
     """Run all trials on all processors.
 
-    Return the scores, and how many times the session of the driver was run for them.
+    Return the scores, and the number of runs of the driver's session.
 
-    ``share``: the number of trials, as a share of the usual number. ``scripts``: number of scripts
-    for each scene.
+    ``share``: share of the usual number of trials.
+
+    ``scripts``: number of scripts for each scene.
     """
     jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
     total: Scores = {}
