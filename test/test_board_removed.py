@@ -35,13 +35,10 @@ sys.exit(pytest.main(sys.argv[1:]))
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_without_the_files_of_one_board_the_rest_still_works(board: str, tmp_path: Path) -> None:
-    """The package is copied without the files of one board.
+    """Without the files of one board, all other modules can be imported and some tests pass.
 
-    ``__pycache__`` is also copied, because this saves time. The removed modules stay absent: Python
-    imports nothing from ``__pycache__`` if the source is missing.
-
-    All other modules of the driver can still be imported. The tests of ``sim://`` and a test of a
-    remaining board pass. If the default board is removed, a test of the complete driver passes too.
+    The copy includes ``__pycache__`` to save time: Python imports nothing from there if the source
+    is missing. If the default board is removed, a test of the complete driver passes too.
     """
     default, *others = boards.PROFILES
     remaining = others[0] if board == default else default

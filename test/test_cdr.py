@@ -64,8 +64,7 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 def padded(data: bytes, like: bytes) -> bytes:
     """Return ``data`` with its padding bytes replaced by those of ``like``.
 
-    Padding bytes follow the NUL of a string, up to the next multiple of eight bytes. rclpy may put
-    any bytes there.
+    After the NUL of a string, rclpy puts any bytes up to the next multiple of eight.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):

@@ -39,10 +39,7 @@ def test_a_write_that_fails_or_is_not_wanted_leaves_the_old_file(tmp_path: Path)
 
 
 def test_an_unused_name_is_numbered_if_the_name_is_taken(tmp_path: Path) -> None:
-    """A free name is returned unchanged. If a file has this name, the name gets the number 2.
-
-    If a folder already has the name with the number 2, the number is 3.
-    """
+    """A free name is returned unchanged; a taken name gets the first free number from 2 on."""
     path = tmp_path / "move.csv"
     assert unused(path) == path
     path.touch()

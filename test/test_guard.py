@@ -82,11 +82,7 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """The driver changes the stop bytes when the state of the board changes.
-
-    From then on, the guard process writes the new bytes. If another guard process replaces it, the
-    other process writes the new bytes, too.
-    """
+    """The guard process, and its replacement, write the newest stop bytes from the driver."""
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
     keeper.change(*words)
@@ -108,10 +104,9 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 def test_the_last_packets_of_an_orderly_end_are_not_discarded(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the driver ends without a proof of a stop, its last packets are not discarded.
+    """If the driver ends without a proof of a stop, the guard repeats Stop and discards nothing.
 
-    These packets, such as a pause, may still wait in the kernel. So the guard process repeats Stop
-    without discarding them.
+    The last packets, such as a pause, may still wait in the kernel.
     """
     reading, writing = os.pipe()
     process = SimpleNamespace(stdin=os.fdopen(writing, "wb", 0), wait=lambda _within_s: 0)
@@ -267,10 +262,9 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """The guard process distinguishes heartbeats from stop bytes in one pipe, wherever a read ends.
+    """The guard distinguishes heartbeats from stop bytes in one pipe, wherever a read ends.
 
-    An ``e`` outside the stop bytes is a heartbeat with a latched e-stop. An ``e`` within the stop
-    bytes is a part of them.
+    Outside the stop bytes, an ``e`` is a heartbeat with a latched e-stop.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

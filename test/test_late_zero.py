@@ -2,9 +2,8 @@
 
 """Tests of a zero command that arrives too late while the robot drives to a goal.
 
-The driver refuses the zero command, because it is too old. But the command usually ends the goal.
-Otherwise, the robot would drive on: a goal does not expire, and a joystick that is released sends
-its zero command only once.
+The driver refuses the command, but usually ends the goal: goals do not expire, and a released
+joystick sends its zero command only once.
 """
 
 import math
@@ -103,10 +102,9 @@ def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
 def test_a_late_zero_is_refused_but_ends_a_goal(
     action: Action, late_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A zero command that is too old is refused, but it ends the drive to a goal.
+    """A zero command that is too old is refused, but ends the drive to a goal.
 
-    A released joystick sends the zero command, which arrives too late. The robot stops well before
-    the goal, and a notice gives the reason.
+    The robot stops well before the goal, and a notice gives the reason.
     """
     bench, topic = on_the_way(monkeypatch)
     topic.action = action
@@ -130,10 +128,9 @@ def test_a_late_velocity_and_nan_do_not_end_a_goal(
 
 
 def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The robot drives by cmd_vel, and a zero command arrives late. The driver refuses the zero.
+    """A late zero command is refused, and the velocity command of cmd_vel stays in effect.
 
-    The velocity command stays in effect, because it may be newer than the zero. If no other command
-    follows, it expires.
+    The velocity command may be newer than the zero, and expires by itself.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)
@@ -146,10 +143,9 @@ def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -
 def test_a_zero_ends_no_goal_on_a_board_whose_switch_is_on_positional_control(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the control method ``position``, a zero on cmd_vel does not end a goal.
+    """On positional control, a zero on cmd_vel does not end a goal.
 
-    The board's switch is set to positional control, and the robot drives to a goal. With this
-    control method, the driver refuses all commands on cmd_vel. So the goal stays in effect.
+    The driver then refuses all commands on cmd_vel.
     """
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()

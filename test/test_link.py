@@ -71,10 +71,10 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard process gets at most ten heartbeats a second, although the pacer runs more often.
+    """The guard process gets at most ten heartbeats a second, even if the pacer runs more often.
 
-    The reason: if a guard has many unread heartbeats, the driver regards it as hung and replaces
-    it. At a higher rate of heartbeats, the driver would also replace a guard that is only slow.
+    The driver replaces a guard with many unread heartbeats, so a higher rate would affect slow
+    guards.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -151,9 +151,8 @@ def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proof
 ) -> None:
     """The longest possible shutdown of a link is shorter than the time limit of the driver's end.
 
-    At the shutdown, the link waits for two proofs of a standstill. The waits are as long as
-    possible: displacements are rare, the first proof comes at the last moment, and the second one
-    does not come. After both waits, there is still time for the guard's last words.
+    The link waits as long as possible for two proofs of a standstill. Time is left for the guard's
+    last words.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S
@@ -180,8 +179,7 @@ def test_every_read_and_every_write_can_be_listened_to(
 ) -> None:
     """``on_read`` gets all bytes that the link reads, and ``on_write`` all bytes that it writes.
 
-    The written bytes include the final Stop. The link discards bytes that arrived before its start,
-    so ``on_read`` does not get them.
+    ``on_write`` also gets the final Stop. ``on_read`` gets no bytes from before the link's start.
     """
     end_patiently(monkeypatch)
     read, written = [], []
@@ -240,10 +238,9 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """A guard process cannot share a port of this kind (``loop://``). The driver reports this once.
+    """The driver reports once that a guard process cannot share a port of this kind (``loop://``).
 
-    The user must know it, because without a guard process only the driver itself can stop the
-    robot.
+    Without a guard process, only the driver itself can stop the robot.
     """
     listener = Listener()
     link = link_to("loop://", listener, session())

@@ -102,11 +102,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """The e-stop is latched, a command is refused, and the e-stop is released.
-
-    The listener gets these events in this order. So the log shows the reason of the refusal before
-    the refusal.
-    """
+    """The listener gets the latch of the e-stop, then the refused command, then the release."""
     listener, ours = Listener(), session()
     link = link_to(
         board.path, listener, ours, refused=lambda text: listener.deliver([Notice(text)])

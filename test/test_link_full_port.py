@@ -35,9 +35,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A write fails because the port is full. The board may have received only a part of a command.
+    """After a failed write, the link writes Stop, then its opening sequence, before anything else.
 
-    So the link first writes Stop, then its opening sequence, before anything else.
+    The board may have received only a part of a command.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -81,11 +81,10 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
     full: bool, terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The board is silent, so the link closes without a proof of rest, and the guard repeats Stop.
+    """At an end without a proof of rest, the content of the port decides what the guard does.
 
-    There are two cases. If the port has accepted the link's last packets, they may still be in the
-    port's buffer, so the guard keeps the buffer. If the port is full, its buffer contains old
-    commands, so the guard discards them.
+    * The port has accepted the link's last packets: the guard keeps them in the buffer.
+    * The port is full of old commands: the guard discards them.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

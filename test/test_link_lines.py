@@ -173,9 +173,9 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 def test_an_overrun_is_counted_once_although_another_line_is_lost_and_comes_back(
     lines: Lines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The kernel has lost bytes of two lines, 5 and 3 times. The second line is lost and reopened.
+    """When a lost line is opened again, the total number of overruns of all lines is unchanged.
 
-    The kernel counts the losses of the new connection from 0. The total remains 8.
+    The kernel counts the overruns of the new connection from 0.
     """
     overruns = {lines.drive.path: 5, str(lines.name): 3}
     monkeypatch.setattr(SerialPort, "overruns", property(lambda port: overruns[port._url]))
@@ -215,11 +215,7 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
 
 
 def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> None:
-    """The bytes that stop the board depend on the board's state.
-
-    The link sends the bytes for the present state to the guard process. When the state changes, the
-    link sends the new bytes.
-    """
+    """When the board's state changes, the guard process gets the bytes that now stop the board."""
     with closing(Lines(tmp_path, MoodyBoard())) as lines:
         lines.connect()
         lines.link.start()

@@ -72,10 +72,9 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 
 
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
-    """A board is unplugged during a drive and comes back under another device name.
+    """A board that comes back under another device name is found by udev's symbolic link.
 
-    The link finds it, because udev's symbolic link points to the new name. The link does not repeat
-    the old command.
+    The old command is not repeated.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
@@ -136,10 +135,9 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The port is lost during a drive, and appears again while the driver ends.
+    """If a lost port appears again while the driver ends, the driver sends Stop.
 
-    The driver sends Stop. No data confirms that the robot is at rest, so the driver does not report
-    that it is.
+    No data confirms that the robot is at rest, so the driver does not report rest.
     """
     end_patiently(monkeypatch)
     name = tmp_path / "omnibot"

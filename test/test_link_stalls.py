@@ -36,9 +36,9 @@ def obeyed(command: Callable[[], None]) -> bool:
 def test_a_command_that_waited_while_the_pacer_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A thread holds the session's lock. So the pacer cannot run, and a command waits for the lock.
+    """A command that waited while the pacer could not run is refused; new commands are obeyed.
 
-    The driver refuses the command that waited. After this stall, it obeys new commands.
+    Here, a thread holds the session's lock.
     """
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()

@@ -74,10 +74,10 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """Nothing reads the program's output. At its end, it prints a message and does not block.
+    """A message at the program's end does not block, even if nothing reads the output.
 
-    There are two cases. The program has filled the pipe exactly (16 blocks of 4096 bytes), or it
-    has printed more than the pipe can hold (100 blocks).
+    * The program has filled the pipe exactly: 16 blocks of 4096 bytes.
+    * The program has printed more than the pipe can hold: 100 blocks.
     """
     program = f"""
 import contextlib, os, time

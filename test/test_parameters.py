@@ -324,10 +324,6 @@ def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
 
 
 def test_a_minimum_without_a_maximum_is_accepted() -> None:
-    """A board has a parameter ``battery_minimum``, but no ``battery_maximum``.
-
-    The driver checks that a minimum is below the maximum of the same name. Without this maximum,
-    there is nothing to check, and the parameter is accepted.
-    """
+    """A minimum is accepted if the board has no maximum of the same name."""
     row = Parameter("battery_minimum", 20.0, "V", "Lowest voltage.", low=0.0, high=60.0)
     assert parameters.table("omnibot", OmniBot.traits, own={"Own": (row,)}).check_all({})

@@ -142,8 +142,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 ) -> None:
     """Measurements are published only after the simulated clock has begun.
 
-    While the simulated clock stands between two steps, the stamps still increase. If the clock
-    jumps back, the stamps jump back too.
+    Stamps increase even while the simulated clock stands, and jump back with the clock.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
@@ -185,8 +184,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
     """The driver passes on the result of a request before the simulated clock has begun.
 
-    A result needs no stamp. Measurements that only one board makes need a stamp, so the driver does
-    not publish them before the clock has begun.
+    Measurements need a stamp, so the driver does not publish them before the clock has begun.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -216,10 +214,9 @@ WITHOUT_STAMP = (
 
 @pytest.mark.parametrize("value", WITHOUT_STAMP, ids=lambda value: type(value).__name__)
 def test_what_needs_no_stamp_does_not_wait_for_simulated_time(node: Node, value: object) -> None:
-    """The simulated clock has not begun. The board's records and changes of state are passed on.
+    """Records and changes of state are passed on before the simulated clock has begun.
 
-    If they waited for the clock, ~/record_rpm would answer only after 120 s. A press of the e-stop
-    button would never be published, because the board reports a press only once.
+    Otherwise, ~/record_rpm would answer only after 120 s, and a press of the button would be lost.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -252,10 +249,9 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A pause begins and ends within one read. Later subscribers get the state "nominal".
+    """If a pause begins and ends within one read, later subscribers get the state "nominal".
 
-    Subscribers get the last published state. While the driver processes the read, another thread
-    publishes the state "paused". So the driver must publish "nominal" after the read.
+    Another thread publishes "paused" during the read, so "nominal" must be published afterwards.
     """
     session, publishing = session_with(node)
     published: list[str] = []

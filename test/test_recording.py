@@ -75,10 +75,9 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """A bag has two robots, and each robot has two lines. The user gives the topic of one line.
+    """The topic of one line selects a robot; all lines of this robot are replayed.
 
-    This topic selects the robot. Both lines of this robot are replayed, and the bytes of each line
-    reach the channel of this line.
+    The bytes of each line reach the channel of this line.
     """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
@@ -145,10 +144,9 @@ def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
 def test_the_bag_of_another_board_names_the_missing_lines_and_the_board(
     tmp_path: Path, recorded: Sequence[str], channels: Sequence[str], query: str, needed: str
 ) -> None:
-    """A bag has no line of the selected board, but lines of another board.
+    """If a bag is of another board, the message names the needed lines and those in the bag.
 
-    The message names the lines that this board needs and those that the bag has, and says that the
-    parameter ``board`` may be wrong. Sent bytes are not offered.
+    The message asks to check the parameter ``board``. Topics of sent bytes are not named.
     """
     present = [RX + name for name in recorded]
     sent = "/omnibot_driver/raw_tx"
@@ -206,10 +204,10 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
     tmp_path: Path, given: str
 ) -> None:
-    """A recorder was killed. The mcap file lacks its end, and the folder lacks metadata.yaml.
+    """From the bag of a killed recorder, the replay has every complete packet, and no more.
 
-    The replay has every complete packet, and then says what is incomplete. `ros2 bag reindex` adds
-    only metadata.yaml, so the result is the same after it. The bag is not changed.
+    The replay then says what is incomplete, even after ``ros2 bag reindex``. The bag is not
+    changed.
     """
     path = bag(tmp_path / "bag", RX)
     file = path / "bag.mcap"

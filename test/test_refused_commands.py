@@ -63,10 +63,9 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion monitor has stopped the robot. Then only invalid or late commands come.
+    """A sender of refused commands is not silent, so its next valid command is refused, too.
 
-    The robot may move again only after its sender was silent for a time. This sender was not
-    silent, although its commands were refused. So the driver refuses its next valid command, too.
+    After a stop by the motion monitor, motion is refused until the sender was silent for a time.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -80,10 +79,9 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot. Later commands are refused because of a stall.
+    """Commands that are refused because of a stall also show that their sender is not silent.
 
-    Such commands show that their sender is not silent. So the driver also refuses the next command
-    that comes after the stall.
+    So the driver also refuses the sender's next command after the stall.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -103,9 +101,8 @@ def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
 ) -> None:
     """A refused command does not bring back a refusal of motion that has already ended.
 
-    The motion monitor has stopped the robot. Motion is refused until the sender has paused for
-    ``cmd_vel_timeout``. After this pause, a late command comes, and is refused because it is late.
-    The driver obeys the next command.
+    After a stop by the motion monitor, this refusal ends when the sender pauses for
+    ``cmd_vel_timeout``.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

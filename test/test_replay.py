@@ -148,10 +148,9 @@ def test_the_pace_makes_no_difference() -> None:
 
 
 def test_time_passes_as_it_did() -> None:
-    """A recording has a silence of 2 s. In the replay, the silence lasts 2 s by recorded time.
+    """A silence of 2 s in a recording lasts 2 s in the replay, by recorded time.
 
-    The state of the replay is ``connecting`` during the silence, and ``disconnected`` at the end of
-    the recording.
+    The state is ``connecting`` during the silence, and ``disconnected`` at the end.
     """
     heard = play(Tape(simulated(600, silent=range(200, 400))))
     assert heard.states == [
@@ -164,9 +163,9 @@ def test_time_passes_as_it_did() -> None:
 
 @pytest.mark.parametrize("speed", [100.0, math.inf])
 def test_a_step_of_the_recorders_clock_is_not_waited_for(speed: float) -> None:
-    """The recorder's clock was set forward by 1000 days in the middle of a drive.
+    """If the recorder's clock was set forward by 1000 days, the replay plays 10 s of the pause.
 
-    The replay says so, plays 10 s of the pause, and continues with the stamps of the recording.
+    The replay reports the pause, and continues with the stamps of the recording.
     """
     step_s = 1000 * 86_400
     drive = simulated(400)

@@ -104,10 +104,9 @@ def test_a_prefix_without_its_slash_is_told_of_with_the_remedy(prefix: str) -> N
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """With simulated time, the driver warns if /clock is not published.
+    """With simulated time, the driver warns if /clock is not published, except in a replay.
 
-    Measurements would wait for /clock. In a replay, they do not wait, because a recording has its
-    own stamps. So there is no warning.
+    A recording has its own stamps, so its measurements do not wait for /clock.
     """
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the stall detector.
+"""Tests of the stall detector, which finds stalls of the pacer, the thread that repeats commands.
 
-The stall detector finds stalls of the pacer, which is the thread that repeats commands. It also
-tells which commands may have waited during a stall: for these commands, its method ``outlived_by``
-returns False. The tests call such a command *refused*.
+The method ``outlived_by`` returns False for a command that may have waited during a stall. The
+tests call such a command *refused*.
 """
 
 import pytest
@@ -71,10 +70,9 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """The driver stalls three times. Commands from before the end of the last stall are refused.
+    """After several stalls, commands from before the end of the last stall are refused.
 
-    A command may even come from the time before an earlier stall, because the middleware may
-    deliver it only after several stalls. Such a command is refused, too.
+    The middleware may deliver a command only after several stalls.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
@@ -88,10 +86,9 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """If a command seems to come from a stall that ended long ago, it is not refused.
+    """A command that seems to come from a stall that ended 98 s ago is not refused.
 
-    The stall ended 98 s ago. A command cannot be in transit for that time, so the sender's clock
-    must be wrong.
+    No command is in transit for that time, so the sender's clock must be wrong.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
@@ -111,9 +108,9 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command seems to be sent 1 ms after the end of a stall. It is refused.
+    """A command that seems to be sent 1 ms after the end of a stall is refused.
 
-    The driver knows the sender's clock only roughly, so the command may come from the stall.
+    The driver knows the sender's clock only roughly.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
@@ -169,7 +166,6 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
     """The driver notices each stall that makes the guard process act.
 
-    If the driver did not notice such a stall, it would send motion commands while the guard process
-    sends stop bytes.
+    Otherwise, the driver would send motion while the guard process sends stop bytes.
     """
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

@@ -114,9 +114,9 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """A command that has waited too long in the driver's own queue is refused, even a first one.
+    """A command that waited too long in the driver's own queue is refused, even a first one.
 
-    The driver measures this wait by its own clock, so it need not know the sender's clock.
+    The driver measures this wait by its own clock.
     """
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
@@ -268,9 +268,9 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_an_old_command_is_refused_after_a_night_without_commands() -> None:
-    """The driver gets no command for eight hours. Then a command arrives that was sent 5 s ago.
+    """A command that was sent 5 s ago is refused, even after eight hours without a command.
 
-    In this time, the clocks may have drifted apart, but not by as much as 5 s.
+    The clocks drift apart by less than 5 s in this time.
     """
     receiver, sender = Receiver(), Sender()
     for number in range(20):
@@ -290,9 +290,8 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """The second message of a sender has two possible times of sending.
 
-    The first message was late by 0.5 s, but the driver assumes that it was in time. So the
-    estimated time of the second one is 0.5 s too late. The time by the sender's clock is right
-    here.
+    * Estimated from the first message, which was late by 0.5 s: 0.5 s too late.
+    * By the sender's clock: right here.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

@@ -2,8 +2,8 @@
 
 """Tests that the driver makes few Python calls for the data of one tick (10 ms) of a running board.
 
-Each test has a bound for the number of calls, and measures no times. A change that raises a bound
-gives its reason in docs/internals/performance.md.
+Each test has a bound for the number of calls. A change that raises a bound gives its reason in
+docs/internals/performance.md.
 """
 
 import gc
@@ -74,10 +74,9 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """Run ``work`` for each tick of a running board, and count its calls of Python functions.
+    """Run ``work`` for each tick of a running board, and return its mean numbers of Python calls.
 
-    Return a mean count for each kind of tick. The key of a kind is the number of bytes that the
-    board sends in such a tick.
+    The key is the kind of tick: the number of bytes that the board sends in it.
     """
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Scripts of the outbound trials: drives, and every way in which a drive ends.
+"""Seeded scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made from a seed. Many commands contain bytes that equal a letter or a header.
+Many commands contain bytes that equal a letter or a header.
 """
 
 import math

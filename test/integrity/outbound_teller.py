@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A minimal simulation of what a board sends, without any code of the driver.
+"""A minimal simulation of a board's reports, without any code of the driver.
 
-The readings of a moving robot show the twist that the driver commanded last, even if the line has
-damaged this command. So the driver cannot see the damage in the readings.
+The reported motion is the twist that the driver sent last, even if the line damaged the command. So
+the reports do not reveal the damage.
 """
 
 import math

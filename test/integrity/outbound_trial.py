@@ -2,9 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-A running board reports a moving robot while the driver sends motion commands, even if the line
-loses them. It also does so while the last set-point that it received is a motion. A change of the
-board's state appears in its reports after one or two ticks.
+A running board reports motion if the driver sends motion commands, or if the last received
+set-point is a motion. A change of the board's state appears in its reports after one or two ticks.
 """
 
 import math
@@ -35,11 +34,9 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
-A key has three items: the bytes that the receiver held before, whether the line was idle at that
-time, and the new bytes. A value has two items: the bytes that the receiver holds afterwards, and
-the frames that it has found. Each frame comes with the position of its last byte. The value is
-``None`` if the receiver has found a letter (S, P or R): the new bytes must then be processed one by
-one.
+* Key: the bytes held before, whether the line was idle then, and the new bytes.
+* Value: the bytes held afterwards, and the frames found, each with the position of its last byte.
+* ``None``: the receiver has found a letter; the new bytes must be processed one by one.
 """
 
 
@@ -78,8 +75,7 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    The constructor plays the scene up to the time from which the line has faults. Each call of
-    ``run`` continues from there.
+    The constructor plays the scene until the faults of the line begin; ``run`` plays the rest.
 
     ``memo``: cached results, which trials with the same kind of receiver may share.
     """

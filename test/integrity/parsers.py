@@ -34,10 +34,9 @@ def driver() -> tuple[Feed, Feed]:
 
 
 def plain() -> tuple[Feed, Feed]:
-    """Make a parser that has no checks. Return the functions that feed and flush it.
+    """Make a parser without checks. Return the functions that feed and flush it.
 
-    The two bytes of a header give the kind and the length of a frame. The parser checks nothing
-    else.
+    The two header bytes alone determine the kind and the length of a frame.
     """
     held = bytearray()
 

@@ -2,8 +2,7 @@
 
 """Common parts of the integrity reports: damage to a stream in pieces, and sums of scores.
 
-This module depends on bytes, and on scores with the operator ``+=``, but not on the format of
-frames.
+The module does not know the format of frames. Scores need only the operator ``+=``.
 """
 
 import os

@@ -42,11 +42,11 @@ class Outcome:
 
     ``seconds``: duration of the drive.
 
-    ``trips``: for each stop by the motion monitor, a text with its time and cause.
+    ``trips``: time and cause of each stop by the motion monitor, as text.
 
-    ``said``: how often the driver logged each warning, and how often it refused a command.
+    ``said``: counts of each warning of the driver, and of refused commands.
 
-    ``happened``: how often people pushed, bumped, held or carried the robot.
+    ``happened``: counts of pushes, bumps, holds and carries.
     """
 
     seconds: float = 0.0

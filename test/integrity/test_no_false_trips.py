@@ -20,11 +20,7 @@ def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """The simulated drive of these tests can detect that the motion monitor stops a robot.
-
-    To show this, the wheels of a robot turn more than twice as fast as commanded. The monitor must
-    stop this robot.
-    """
+    """The motion monitor stops a robot whose wheels turn more than twice as fast as commanded."""
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Short trials of how boards read the driver's bytes from a damaged line; tests of the judge.
+"""Short trials of boards that read the driver's bytes from a damaged line; tests of the judge.
 
-The outbound report (``outbound.py``) has the long trials. The judge compares what the board
-understood with what the driver sent.
+The judge compares what the board understood with what the driver sent. ``outbound.py`` has the long
+trials.
 """
 
 from copy import copy
@@ -42,7 +42,7 @@ class Losing:
 def on_all_receivers(course: Course, line: Line) -> Score:
     """Send the writes of ``course`` to each kind of receiver; return the total score.
 
-    Each receiver gets its own copy of ``line``, so the same bytes are damaged for each of them.
+    Each receiver gets its own copy of ``line``, with the same faults.
     """
     total = Score()
     for receiver in RECEIVERS:
@@ -70,10 +70,9 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """The results of a short run are within the bounds of the outbound report.
+    """The results of a short run of each scene are within the bounds of the outbound report.
 
-    The run has one script for each scene, and repeats it with each kind of receiver. Bounds on
-    rates are not checked, because a short run has too few frames.
+    Bounds on rates are not checked: the run has too few frames.
     """
     scores, _ = one(0.025, (scene, 0), LOSSES)
     for fault in LOSSES:
@@ -89,11 +88,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """A motion frame loses its last byte. The board obeys a wrong frame for less than 1.5 ms.
-
-    The zero at the beginning of the next write completes the frame, which is therefore wrong. The
-    board obeys it until it has received the frame of the next write.
-    """
+    """After a motion frame loses its last byte, the board obeys a wrong frame for under 1.5 ms."""
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
         number
@@ -114,11 +109,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """The judge reports stray motion if the board takes a damaged Stop for a command.
-
-    The Stop has lost one byte, and the first byte of the next Stop completes its frame. The board
-    reads this frame as a wheel command of 255 LSB.
-    """
+    """The judge reports stray motion if a Stop that lost a byte becomes a wheel command."""
     judge = Judge()
     judge.write(parse(STOP), 0.0)
     judge.write(parse(STOP), 0.05)
@@ -130,12 +121,7 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """The judge distinguishes an old set-point from a set-point that was never sent.
-
-    For a moment, the board still follows the set-point of the previous write. The judge reports no
-    error. Later, the board follows a set-point with a changed bit. The judge reports this set-point
-    as uncommanded.
-    """
+    """The judge accepts the previous set-point for a moment, and reports an uncommanded one."""
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
     judge = Judge()
@@ -153,11 +139,10 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """The judge distinguishes letters that the driver sent from other letters.
+    """The judge accepts a letter that the driver sent, and counts other letters.
 
-    The board acts on three letters. The driver sent the first one, so the judge accepts it. The
-    second is a byte of a frame, so the judge reports a "false" letter. The line added the third, so
-    the judge counts it as "added".
+    * A byte of a frame that the board takes for a letter: "false".
+    * A letter that the line added: "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
@@ -211,11 +196,7 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """The function ``over`` adds the scores of one scene, or of all scenes that end with a stop.
-
-    With the name of a scene, it adds the scores of this scene, even if the robot need not stop in
-    it. Without a name, it adds the scores of all scenes in which the robot must stop.
-    """
+    """``over`` adds the scores of a given scene, or of all scenes in which the robot must stop."""
     scores = {
         ("a", "r", "timeout"): Score(trials=1),
         ("a", "r", "kill"): Score(trials=2),

@@ -81,10 +81,10 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 
 
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
-    """Combine one choice from each list, and return about one in ``number`` of all combinations.
+    """Return about one in ``number`` of all combinations of one choice from each list.
 
-    If every list has at least ``number`` choices, any two choices from different lists are together
-    in at least one of the returned combinations.
+    With three or more lists of at least ``number`` choices, each pair of choices from different
+    lists occurs.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [
@@ -222,10 +222,9 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder can restore the state that it had after any earlier frame.
+    """The decoder restores its state after any earlier frame by evaluating at most 6 frames again.
 
-    The restored states are equal to those of a decoder that evaluates all frames one by one. To
-    restore a state, the decoder evaluates at most 6 frames again.
+    The restored states equal those of a decoder that evaluates all frames one by one.
     """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
@@ -267,10 +266,9 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """``least_costs`` gives, for each node of the trellis, a lower bound of the cost to the end.
+    """``least_costs`` is a lower bound of the cost from each node of the trellis to the end.
 
-    The bound is 0 at the end, and along an edge it falls by at most the edge's cost. So no path to
-    the end costs less than the bound.
+    The bound is 0 at the end, and along an edge it falls by at most the edge's cost.
     """
     least = least_costs(data)
     search = trellis._Search(

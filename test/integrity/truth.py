@@ -2,8 +2,8 @@
 
 """Generator of true streams: the frames and bytes that a board sends, with arrival times in s.
 
-The generator uses the layouts in the manual, and no code of the driver. The noise is that of an
-MPU6050 with its filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
+The layouts are those of the manual; no code of the driver is used. The noise is that of an MPU6050
+with its filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
 """
 
 import math
@@ -23,8 +23,7 @@ Key = tuple[object, ...]
 class Truth:
     """A true stream: its bytes, their times of arrival in s, and its frames.
 
-    An item of ``frames`` is the frame's content, the index of its first byte, and the index after
-    its last byte.
+    ``frames``: content, index of the first byte, and index after the last byte.
     """
 
     data: bytearray = field(default_factory=bytearray)

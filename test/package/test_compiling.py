@@ -2,8 +2,7 @@
 
 """Tests of an installation with ``OMNIBOT_DRIVER_COMPILE=1``, which compiles a part of the core.
 
-If compiling fails, plain Python is installed. A substitute for mypyc makes one small C module,
-because mypyc itself takes a minute.
+A substitute for mypyc makes one small C module, because mypyc takes a minute.
 """
 
 import os
@@ -52,9 +51,8 @@ FAILURES = {
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
     """Build the package into ``lib`` in ``folder``, and return the output of the build.
 
-    A small substitute runs instead of mypyc. ``fails``: Python statement that the substitute runs.
-    ``source``: content of the C file that the substitute writes. ``wanted``: value of
-    ``OMNIBOT_DRIVER_COMPILE``.
+    ``fails``: Python statement that the substitute for mypyc runs. ``source``: C code that the
+    substitute writes. ``wanted``: value of ``OMNIBOT_DRIVER_COMPILE``.
     """
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()

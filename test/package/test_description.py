@@ -55,7 +55,7 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
     """Return the position of a wheel in m, and the velocity of its centre over the ground in m/s.
 
-    The wheel turns with ``rate_radps``, and its lowest point touches the ground without slip.
+    The wheel rolls without slip.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -92,11 +92,9 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """The driver's kinematics convert a motion of the body to wheel rates.
+    """Wheels that turn at the rates of the driver's kinematics move the body as commanded.
 
-    The wheels of the description turn at these rates, and each wheel rolls over the ground. In the
-    rolling direction, its speed equals that of the body at the place of the wheel. Motion across
-    the rolling direction is not compared, because the rollers allow it.
+    Only the rolling direction of each wheel is compared: the rollers allow motion across it.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

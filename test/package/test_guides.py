@@ -97,8 +97,8 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 def test_what_the_driver_tells_is_explained() -> None:
     """The troubleshooting guide has a row for each message of the driver.
 
-    A row can belong to a message in two ways: it contains the beginning of the message, or the
-    message contains all parts that the row quotes.
+    The row contains the beginning of the message, or the message contains all parts that the row
+    quotes.
     """
 
     def is_explained(template: str) -> bool:
@@ -144,10 +144,9 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the end of the commissioning guide lists all steps of the guide.
+    """The commissioning guide's form lists all steps of the guide, and only parameters that exist.
 
-    Each parameter that the form names is a parameter of the driver. The only exception is
-    ``imu_rpy``, which belongs to the robot's description.
+    The exception ``imu_rpy`` belongs to the robot's description.
     """
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))

@@ -244,11 +244,7 @@ def test_the_parameter_file_is_that_of_the_board(
 def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
     launch: Callable[..., Started], tmp_path: Path, file: str
 ) -> None:
-    """The user gives the argument ``board``, and a parameter file that does not name a board.
-
-    The driver uses the board of the argument. If the argument were ignored, the driver would use
-    the default board, the OmniBot, and its frames.
-    """
+    """The argument ``board`` selects the board if the user's parameter file names none."""
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")
     started = launch(f"{file}.launch.py", "board:=lois_ecu", f"params_file:={own}")

@@ -66,9 +66,9 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
 
 @pytest.fixture
 def venv_with_errors(tmp_path: Path) -> Path:
-    """Return a complete ``.venv`` whose Python is a script that only records its arguments.
+    """Return a complete ``.venv`` whose Python only records its arguments.
 
-    If the arguments request a check, the script exits with 1, as if the check had found errors.
+    If the arguments request a check, the exit code is 1, as if the check had found errors.
     """
     venv = tmp_path / "venv"
     (venv / "bin").mkdir(parents=True)

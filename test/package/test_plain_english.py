@@ -2,8 +2,8 @@
 
 """Tests of the repository's English: phrases that were hard to read are rejected.
 
-Every text file is searched for these phrases as whole words, so names such as ``nobody_waits`` are
-not found. A phrase may span a line break.
+A phrase matches only whole words, so names such as ``nobody_waits`` are not found. A phrase may
+span a line break.
 """
 
 import ast

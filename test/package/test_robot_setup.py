@@ -50,11 +50,7 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """The udev file has a rule for each of four adapters. Only one of the rules is active.
-
-    Each rule, active or commented out, makes the link /dev/omnibot, and gives the group dialout
-    access.
-    """
+    """The udev rules of all four adapters make /dev/omnibot, with access for the group dialout."""
     assert len(OFFERED) == 4
     for rule in OFFERED:
         assert rule["SUBSYSTEM"] == ("==", "tty")
@@ -97,8 +93,8 @@ def unit_settings() -> dict[str, list[str]]:
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
     """The systemd unit starts the driver by ``exec``, so signals reach the driver itself.
 
-    No shell stays in between. The command names a parameter file, but no port. The file contains
-    the port, because the names of the port parameters depend on the board.
+    The command names a parameter file, but no port: the names of port parameters depend on the
+    board.
     """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
@@ -109,8 +105,7 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
     """systemd ends the driver by SIGINT, as ctrl-C does.
 
-    When the driver crashes, systemd sends SIGINT to the guard process, which ignores it. systemd
-    does not kill the guard at once, so the guard can still stop the robot.
+    After a crash of the driver, the guard ignores SIGINT and can still stop the robot.
     """
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]
@@ -132,10 +127,9 @@ def test_systemd_accepts_the_unit() -> None:
 
 
 def test_the_first_process_of_a_container_outlives_the_guard() -> None:
-    """The driver in a container crashes. The driver's guard then repeats Stop for a second.
+    """After a crash of the driver, the container's first process waits until the guard is done.
 
-    The container's first process waits for more than a second before it ends. If it ended earlier,
-    the kernel would also end the guard.
+    The kernel would otherwise end the guard, which repeats Stop for a second.
     """
     (pause_s,) = re.findall(r"^time\.sleep\(([\d.]+)\)$", OUTLIVE.read_text(), re.MULTILINE)
     assert float(pause_s) > guard.TIMES * guard.PACE_S
@@ -158,11 +152,7 @@ def test_the_first_process_of_a_container_passes_a_stop_on(stop: str) -> None:
 
 @pytest.mark.slow
 def test_a_stop_at_any_moment_of_the_start_ends_the_container() -> None:
-    """The first process of a container receives SIGTERM at any moment of the driver's start.
-
-    No process stays behind. Before the driver runs, the first process ends. Afterwards, it passes
-    SIGTERM on to the driver.
-    """
+    """A SIGTERM at any moment of the driver's start ends all processes of the container."""
     command = [sys.executable, OUTLIVE, "bash", "-c", DRIVER.format("true")]
     containers = []
     for number in range(40):

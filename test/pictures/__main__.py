@@ -2,8 +2,8 @@
 
 """Make the pictures of the README and the documents, except those that no program can make.
 
-``make pictures`` runs this program. Each module's ``main(folder)`` writes pictures into that
-folder. Each module runs in its own process, two at the same time.
+``make pictures`` runs this program. It runs two modules at a time, each in its own process; their
+``main(folder)`` writes the pictures.
 """
 
 import os

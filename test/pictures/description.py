@@ -48,9 +48,9 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """The places where rays enter and leave a solid, and the normals of its surface there.
+    """The points where rays enter and leave a solid, and the normals of its surface there.
 
-    ``rays``: indices of the rays that meet the solid, one for each element of the other arrays.
+    ``rays``: for each element of the other arrays, the index of the ray.
 
     ``near``, ``far``: distances at which a ray enters and leaves.
     """
@@ -104,9 +104,9 @@ class Solid:
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
         """Return the normals of the surface where rays enter or leave the solid.
 
-        The arguments are in the solid's own axes. ``start``, ``way``: origins and directions of the
-        rays. ``at``: distances from the origins to the surface. ``axis``: for each ray, the axis
-        across the face that it meets. ``sign``: 1 if the rays leave the solid, -1 if they enter.
+        ``start``, ``way``, ``at``: origins and directions of the rays, and distances to the
+        surface, in the solid's own axes. ``axis``: for each ray, the axis across the face that it
+        meets. ``sign``: 1 if the rays leave the solid, -1 if they enter.
         """
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))
@@ -219,7 +219,7 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
     """Draw transparent solids over the colours behind them, from the lowest to the highest.
 
-    If a ray meets a face at a flat angle, the face hides more of what is behind it.
+    A face hides more if the ray meets it at a flat angle.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

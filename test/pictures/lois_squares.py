@@ -2,8 +2,8 @@
 
 """Picture of squares of 5 m that a simulated LOIS ECU drives: the true path, and ``odom``'s path.
 
-With each firmware variant, the robot drives one square to the left and one square to the right. The
-program prints the errors of ``odom`` as rows of a table.
+The robot drives one square to each side with each firmware variant. The program prints the errors
+of ``odom`` as table rows.
 """
 
 import math

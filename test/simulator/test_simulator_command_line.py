@@ -52,11 +52,9 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
 
 
 def test_in_the_background_it_leaves_the_terminal_to_other_programs() -> None:
-    """A user starts the program with ``&``, and types in the same terminal.
+    """A simulator started with ``&`` does not read the terminal, and ends at SIGTERM.
 
-    The program does not read what the user types, and ends at SIGTERM. If the program read from
-    the terminal, the kernel would suspend the program. A suspended program would not end at
-    SIGTERM.
+    If it read the terminal, the kernel would suspend it, and SIGTERM would not end it.
     """
     user, terminal = os.openpty()
     os.write(user, b"quit\n")
@@ -104,9 +102,9 @@ def test_the_boards_are_the_packages_beside_what_they_share() -> None:
 
 
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
-    """A user gives one ``--link`` for a board with two lines. Each line gets a link.
+    """With one ``--link`` for a board with two lines, each line gets its own link.
 
-    The program prints a hint how to start the driver. It contains the parameter of each port.
+    The program prints how to start the driver, with the parameter of each port.
     """
     with toy("toy_lines", "--link", str(tmp_path / "toy"), "--angle", "30") as process:
         printed = [line(process), line(process)]

@@ -2,11 +2,9 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-``odo``: the board answers ``ok X`` with its position X, in m.
-
-``move D``: the board drives D m at 0.5 m/s. It then answers ``ok X`` with its new position X.
-
-``stop``: the board ends the move, and answers ``fail stopped`` to the move and ``ok`` to the stop.
+* ``odo``: the board answers ``ok X`` with its position X in m.
+* ``move D``: the board drives D m at 0.5 m/s, then answers ``ok X``.
+* ``stop``: the board answers ``fail stopped`` to the move, and ``ok`` to the stop.
 """
 
 import argparse

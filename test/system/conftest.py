@@ -56,9 +56,8 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
-    If the driver refuses the probe's newest message because of a stall of the driver or of the
-    simulated board, the probe publishes the message again. If an answer to the probe is lost, the
-    probe calls the service again.
+    The probe repeats a message that the driver refused because of a stall, and a call whose answer
+    was lost.
     """
 
     def start(driver: Driver) -> Probe:
@@ -101,9 +100,8 @@ def shared_probe(
 ) -> Iterator[Probe]:
     """A probe of the shared driver, for one test.
 
-    When the test begins, the robot is at rest, and the e-stop is not latched. Two lists are empty:
-    the commands that the board has received, and the output of the driver. At the end of the test,
-    the fixture latches the e-stop.
+    At the beginning, the robot is at rest, the e-stop is released, and the recorded commands and
+    output are empty. At the end, the fixture latches the e-stop.
     """
     board, driver = shared
     probe = probe_of(driver)

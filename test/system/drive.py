@@ -23,15 +23,14 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Reach of the search for the delta that matches a message, as a number of deltas.
+"""Number of deltas to search in each direction for the delta that matches a message.
 
-The search begins at the delta that fits the message's timestamp, and goes in both directions.
+The search begins at the delta that fits the message's timestamp.
 """
 LONGEST_STALL = 1000
-"""Reach of the search for the IMU frame that matches a message, as a number of frames.
+"""Number of frames to search in each direction for the IMU frame that matches a message.
 
-The search begins at the frame that fits the message's timestamp, and goes in both directions. After
-a stall of the computer, the matching frame may be far from this first frame.
+After a stall of the computer, the matching frame may be far from the message's timestamp.
 """
 
 Triple = tuple[float, float, float]
@@ -41,14 +40,13 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    ``imu_sent``, ``odom_sent``: number of frames that the board sent. The count begins with the
-    first frame that the driver published.
+    ``imu_sent``, ``odom_sent``: frames sent, counted from the first that the driver published.
 
-    ``imu_wrong``, ``odom_wrong``: number of messages that match no frame.
+    ``imu_wrong``, ``odom_wrong``: messages that match no frame.
 
     ``worst_m``, ``worst_rad``: largest difference between ``odom`` and the pose of the board.
 
-    ``last_m``, ``last_rad``: this difference in the last message.
+    ``last_m``, ``last_rad``: the difference in the last message.
     """
 
     seconds: float
@@ -225,11 +223,10 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return three lists, with an element for each delta in a board's frames.
+    """Return the deltas in a board's frames, the poses after them, and the indices of IMU frames.
 
-    The lists contain the delta, the pose after the delta, and the index of the last IMU frame
-    before the delta. After every fifth delta, the pose is the exact one that the board sends. After
-    the other deltas, it is the last exact pose plus the rounded deltas since then.
+    After every fifth delta, the board sends its exact pose. The other poses are the last exact pose
+    plus the rounded deltas since then. An index is that of the last IMU frame before the delta.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

@@ -2,8 +2,7 @@
 
 """A nursery for driver processes: one process imports the driver and forks each driver process.
 
-A forked driver starts fast, because imports take most of a normal start. Tests of the start itself
-do not fork: they run a new interpreter.
+A forked driver starts fast. Tests of the start itself run a new interpreter instead.
 """
 
 import atexit
@@ -67,10 +66,9 @@ class Forked:
 
 
 class Nursery:
-    """The connection to the process that forks the drivers.
+    """The connection to the process that imports the driver once and forks each driver process.
 
-    This process imports the driver once, and then forks a new process for each driver. It starts
-    with the first driver, and ends with the tests.
+    The process starts with the first driver, and ends with the tests.
     """
 
     def __init__(self) -> None:

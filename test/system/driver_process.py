@@ -34,11 +34,10 @@ _nursery = Nursery()
 class Driver:
     """The driver as a separate process, by default in a namespace that no other driver uses.
 
-    It is forked from a process that has already imported the driver, except with ``interpreter``.
-
     ``before``: Python code that runs before the driver, in its process.
 
-    ``interpreter``: whether the driver runs in a new interpreter, which also runs exit handlers.
+    ``interpreter``: whether the driver runs in a new interpreter, which also runs exit handlers. If
+    not, a process that has imported the driver forks it.
 
     ``more``: further ROS arguments.
     """

@@ -2,11 +2,9 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set.
-
-With Fast DDS, a process that was once a client of a discovery server can no longer find nodes
-without a server. So a test does not become a client itself, but runs this program. Otherwise, later
-tests in the same process would fail.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. The tests need a
+separate program: in Fast DDS, a process that was a client of a discovery server finds no nodes
+without a server.
 """
 
 import sys

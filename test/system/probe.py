@@ -30,10 +30,9 @@ ANSWER_LOST = "client will not receive response"
 """Words in the driver's output when the middleware has dropped an answer of a service."""
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
-"""Options for subscriptions and for publishers that turn off the events of the middleware.
+"""Options that turn off the middleware's events of subscriptions and publishers.
 
-With these events, the executor would wait for each of them, too. This would take more processor
-time than the messages.
+To wait for these events would take more processor time than the messages.
 """
 
 
@@ -53,8 +52,8 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end of the tests.
 
-    As long as this node exists, the end of a probe does not delete the middleware's participant.
-    Fast DDS has crashed twice during such a deletion.
+    Otherwise the end of a probe would delete the middleware's participant, and Fast DDS might
+    crash.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)
@@ -172,9 +171,8 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again after some seconds.
 
-        If the driver has refused the message because of a stall, this stall is over by then. A
-        second refusal is logged too: the driver logs each kind of refusal at most once in
-        ``WARN_EVERY_S`` (s), and this time has passed.
+        By then, a stall is over, and the driver would log a second refusal, too: it logs each kind
+        of refusal once in ``WARN_EVERY_S`` (s).
         """
 
         def publish() -> None:
@@ -193,8 +191,8 @@ class Probe:
     def call_again(self) -> None:
         """Repeat the calls that have no answer yet.
 
-        The middleware drops an answer if the driver has not discovered the new client within
-        0.1 s. On a busy computer this can take longer.
+        The middleware drops an answer if the driver needs more than 0.1 s to discover the new
+        client.
         """
         for answer in self._answers:
             if not answer.arrived:

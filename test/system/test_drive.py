@@ -6,9 +6,9 @@ from drive import drive
 
 
 def test_over_a_bad_line_few_messages_are_wrong_and_odom_is_near_the_boards_pose() -> None:
-    """The robot drives for 12 s, and its line loses single bytes and bursts.
+    """On a line that loses bytes and bursts, at most 3 in 1,000 messages are wrong.
 
-    At most 3 in 1,000 messages are wrong, usually fewer. The error of odom stays below 15 cm.
+    The error of odom stays below 15 cm.
     """
     outcome = drive(12.0, lose=0.001, burst=0.0005)
     assert outcome.bytes_lost > 60, outcome

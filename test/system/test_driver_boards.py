@@ -98,10 +98,10 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """What the board has works: it obeys cmd_vel, and joint_states has the names of its two wheels.
+    """A board with few features obeys cmd_vel, and ``ask``, a service of this board alone, answers.
 
-    ``ask``, a service that only this board has, gives its answer. /diagnostics has figures of the
-    odometry, but none of an IMU, because the board has no IMU.
+    joint_states has the board's two wheels. /diagnostics has figures of the odometry, but none of
+    an IMU.
     """
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))

@@ -45,11 +45,9 @@ import omnibot_driver.driver as driver, omnibot_driver.link as link
 link.STANDS_WITHIN_S = link.SILENCE_S = link.BOTH_PROOFS_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
-"""Code that makes the driver wait longer at its end, before it gives up.
+"""Code that makes the driver wait longer at its end for the board's report of a standstill.
 
-On a busy computer, the board's report of a standstill comes late. So the driver must wait longer
-for this report. The longer limits do not delay a test, because the driver waits only until the
-report arrives.
+On a busy computer, the report comes late.
 """
 
 
@@ -135,21 +133,16 @@ node.OmniBotDriver._on_estop_topic = hold
 join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20 * timeout)
 """
-"""Code with a callback that blocks the executor's thread.
+"""Code with a callback that blocks the executor until the driver has asked the executor to end.
 
-The callback returns only after the driver has asked the executor to end. The code also gives the
-driver's threads more time to end.
+The driver's threads also get more time to end.
 """
 
 
 def test_a_pending_service_answers_although_the_executor_learns_of_its_result_late(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A user calls ``~/reset``, and the driver ends before the board has finished the reset.
-
-    A callback blocks the executor while the driver ends, so the executor learns of the result late.
-    Nevertheless, the user gets an answer: the driver is shutting down.
-    """
+    """If the driver ends during ``~/reset``, the user gets an answer, even if a callback blocks."""
     board = start_board(boot_time_s=1000.0, running=True)
     driver: Driver = start_driver(board.path, before=HOLDS_THE_EXECUTOR)
     probe: Probe = probe_of(driver)

@@ -108,11 +108,7 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
     board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
 ) -> None:
-    """A driver is killed. For a short time, its guard process still uses the port.
-
-    A new driver tries again and again to open the port. It succeeds when the guard process has
-    released the port.
-    """
+    """A new driver opens the port when the guard process of a killed driver has released it."""
     driving(probe, board)
     driver.end(signal.SIGKILL)
     successor: Driver = start_driver(board.path)

@@ -124,10 +124,9 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 def test_the_bias_is_what_was_set_last(
     start_board: Callable[..., PtyBoard], start_driver: Callable[..., Driver], probe_of: Any
 ) -> None:
-    """The driver uses the gyro bias that was set last.
+    """A ``gyro_bias`` that a user sets replaces the bias that the driver has refined.
 
-    While the robot is at rest, the driver refines the gyro bias. Then the user sets ``gyro_bias``.
-    From then on, the driver uses the user's value, even if the parameter already had this value.
+    The value may be equal to the previous value of the parameter.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
@@ -180,11 +179,7 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     """The diagnostics have seven statuses, show the expected IMU rate, and count no faults."""
 
     def keeps_pace() -> bool:
-        """Return whether the IMU rate is right.
-
-        After a stall of the computer, the rate is too low for a while, and then too high. So the
-        test waits until this function returns True.
-        """
+        """Return whether the IMU rate is right. After a stall, it is wrong for a while."""
         if (status := robot.status("Stream")) is None:
             return False
         values = {value.key: value.value for value in status.values}

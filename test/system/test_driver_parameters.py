@@ -264,10 +264,9 @@ def test_setting_no_parameters_at_once_succeeds(start_driver: Start, probe_of: S
 def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
     start_driver: Start, probe_of: Start
 ) -> None:
-    """A client sets an unknown parameter, one of another board, or a value of an unknown type.
+    """Unknown parameters, those of other boards and unknown types are refused with a reason.
 
-    The driver refuses the change with a reason, and continues. In earlier versions, a value of an
-    unknown type led to an exception in rclpy, which ended the driver.
+    Regression: a value of an unknown type raised an exception in rclpy, which ended the driver.
     """
     driver: Driver = start_driver("sim://")
     probe: Probe = probe_of(driver)

@@ -94,10 +94,9 @@ def driven(probe: Probe, toy: Toy) -> Iterator[None]:
 def test_a_toy_drives_and_is_heard_and_obeys_the_estop(
     start_driver: Start, probe_of: Start, toy: Toy
 ) -> None:
-    """A toy robot obeys cmd_vel, and odom shows its motion. It stops when the commands end.
+    """A toy robot obeys cmd_vel and the e-stop, and odom shows the motion.
 
-    While the e-stop is latched, the robot stays at rest although commands arrive. After the
-    release, the commands move it again.
+    The robot stops when the commands end. After the release of the e-stop, commands move the robot.
     """
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")

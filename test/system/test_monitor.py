@@ -54,8 +54,7 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received a motion command.
 
-    It may be necessary to press several times: a program may stall, or a subscription may not be
-    discovered yet.
+    One press may not be enough: a program may stall, or a subscription may not be discovered yet.
     """
     for _ in range(20):
         said.clear()
@@ -162,10 +161,9 @@ def test_the_space_bar_works_after_a_byte_that_is_no_key(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The user presses a key once, and releases it. The robot stops.
+    """When the user releases the key, the monitor stops the robot by some zero commands.
 
-    To stop it, the monitor sends some zero commands after the motion commands. When the user ends
-    the monitor, it sends one more zero command.
+    At its end, the monitor sends one more zero command.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -208,10 +206,9 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """The user holds a key, so the robot moves. Then the monitor is ended, and it stops the robot.
+    """A monitor that gets SIGTERM, or whose window is closed, stops the robot that it steers.
 
-    There are two cases: the monitor gets SIGTERM, or its window is closed. In this test, the
-    monitor sends stamped commands.
+    Here, the monitor sends stamped commands.
     """
     board = start_board()
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
@@ -258,10 +255,9 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """SIGSTOP suspends the monitor at once, so the monitor cannot restore the terminal first.
+    """A monitor that was suspended by SIGSTOP still restores the terminal at its end.
 
-    After the suspension, the monitor draws its screen again. Then the user presses q. The monitor
-    restores the terminal and ends.
+    After the suspension, the monitor draws its screen again.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

@@ -65,8 +65,7 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
 BUSY = dict(READERS)
 """Functions that return the reads of a busy computer, by the name of the line.
 
-The times of these reads already contain the computer's delays. So the function ``stamp`` adds no
-delay to them.
+The times of the reads contain the computer's delays, so ``stamp`` adds none.
 """
 
 
@@ -133,8 +132,8 @@ def stamp(
     """Generate one stream and stamp its samples.
 
     ``loss``: share of lost bytes. ``skew``: relative error of the board's tick; positive if it is
-    too long. ``event``: what happens in the middle of the stream, a key of ``EVENTS_S``. The host
-    begins to read somewhere in the first second of the stream.
+    too long. ``event``: key of ``EVENTS_S``, for the middle of the stream. The host begins to read
+    in the first second.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = stream_of(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)

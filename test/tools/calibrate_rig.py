@@ -63,7 +63,7 @@ class Rig:
 
         ``draws``: whether the picture is drawn, which takes a second.
 
-        If the calibration fails because the computer was too busy, this method runs it again.
+        A calibration that failed because the computer was too busy is repeated.
         """
 
         def read(question: str) -> str:

@@ -5,8 +5,10 @@
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Number of control ticks that the user looks at to judge a motion. They are the last ticks before
-the answer. They contain the end of the motion, and the standstill after it."""
+"""Number of control ticks before the answer by which the user judges a motion.
+
+These ticks contain the end of the motion, and the standstill after it.
+"""
 
 
 class User:

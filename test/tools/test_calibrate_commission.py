@@ -42,10 +42,9 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The robot has reversed axes, another delta frame and a turned IMU.
+    """The tool finds reversed axes, another delta frame and a turned IMU.
 
-    The tool finds all three, although the user's first answer is impossible. A driver can load the
-    calibration file that the tool writes.
+    The user's first answer is impossible. A driver can load the calibration file.
     """
     with rig(
         tmp_path,
@@ -77,10 +76,9 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_a_speed_limit_is_not_taken_for_positional_control(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """``max_linear_speed`` is below a speed that the tool needs. The tool asks for a higher limit.
+    """If ``max_linear_speed`` is below a speed that it needs, the tool asks for a higher limit.
 
-    With this limit, the driver would reduce the tool's fast commands. The robot would be too slow,
-    as if the board were under positional control.
+    With the limit, the robot would be slow, as if the board were under positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
         assert robot.calibrate("commission", "--only", "board") == 1
@@ -128,12 +126,9 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """One axis is reversed. The tool finds the signs of the axes.
+    """The tool finds the signs of the axes, and notes that they describe a mirror image.
 
-    A note says that these signs describe a mirror image of the robot.
-
-    Before the other answers, the user answers "r", and the tool repeats the motion. The next answer
-    is invalid, and the tool asks again.
+    After the answer "r", the motion is repeated; after an invalid answer, the question is repeated.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

@@ -42,7 +42,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
     """If the odometry is slow, the tool waits 3 s before it reports that the robot does not move.
 
-    The driver in this test has no scale parameters, so the error does not mention scales.
+    The driver has no scale parameters, so the error does not mention scales.
     """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
@@ -91,9 +91,7 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """A robot drives too far, turns too much or takes too long.
-
-    The error gives the distance, the angle or the time.
+    """If a robot drives too far, turns too much or takes too long, the error gives the value.
 
     A pose that is not finite is an error, too.
     """
@@ -110,10 +108,9 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """A robot obeys if it moves with at least a fifth of the commanded velocity.
+    """The tool reports a robot that moves with less than a fifth of the commanded velocity.
 
-    Otherwise the tool reports an error. If a measured velocity contains NaN, the robot does not
-    obey. The tool does not check very slow commands.
+    NaN in a measured velocity is an error, too. Very slow commands are not checked.
     """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
@@ -145,9 +142,9 @@ def test_an_empty_log_has_empty_columns() -> None:
 
 
 def test_wheels_are_as_many_as_the_robot_has() -> None:
-    """A wheel row of the log has the time, then the angles of all wheels, then their rates.
+    """``wheels`` separates the angles from the rates of all wheels.
 
-    ``wheels`` separates the angles from the rates. In this test, the robot has two wheels.
+    A wheel row of the log has the time, then all angles, then all rates.
     """
     log = Log(wheel_rows=[(0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 5.0, 6.0, 7.0, 8.0)])
     assert log.wheels.angle_rad.tolist() == [[1.0, 2.0], [5.0, 6.0]]
@@ -229,10 +226,9 @@ def test_axis_signs_gyro_bias_and_linear_scale_may_be_written() -> None:
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
-    """The user names a file that the tool cannot use for the calibration or for the picture.
+    """The tool rejects a file that it cannot use for the calibration or for the picture.
 
-    The tool rejects the file. Examples: a file of ROS parameters, a file with an invalid value, a
-    picture of an unknown type.
+    Examples: a file of ROS parameters, a file with an invalid value, a picture of an unknown type.
     """
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")

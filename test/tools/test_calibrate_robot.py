@@ -198,10 +198,9 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
     robot: Robot, rigged: Rig, late: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user presses ctrl-C while the tool switches the motion monitor off before a motion.
+    """If ctrl-C comes before a motion, the tool switches the motion monitor on again.
 
-    The monitor is on again afterwards. The tool has not sent a command yet, so its message does not
-    ask the user to cut the power.
+    The tool has sent no command yet, so the message does not ask the user to cut the power.
     """
     set_parameters, presses = robot.set_parameters, [signal.SIGINT]
 
@@ -224,10 +223,9 @@ def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
 def test_a_motion_is_not_evaluated_if_the_clocks_differ(
     robot: Robot, rigged: Rig, behind_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The tool does not evaluate a motion if the robot's clock differs from this computer's clock.
+    """A motion is not evaluated if the robot's clock differs from this computer's clock.
 
-    With a clock that is behind or ahead, the tool would compare a command with the motion at
-    another time. So it ends with an error.
+    The tool would compare a command with the motion at another time.
     """
     seconds = listener._seconds
     monkeypatch.setattr(listener, "_seconds", lambda message: seconds(message) - behind_s)
@@ -293,7 +291,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 ) -> None:
     """If a robot does not come to rest after Stop, the error advises to cut the robot's power.
 
-    If the motion was ended by another error, the message of that error also contains this advice.
+    An earlier error that has ended the motion also contains this advice.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)

@@ -27,11 +27,9 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """Return the log of a drive. Its commands are planned for a board with the scales ``ASSUMED``.
+    """Return the log of a drive that is planned for a board with the scales ``ASSUMED``.
 
-    ``true``: the scales that the board really has.
-
-    ``gyro``: factor on the yaw rate that the gyro measures. With 1, the gyro is right.
+    ``true``: the real scales of the board. ``gyro``: factor on the yaw rate that the gyro measures.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -62,9 +60,9 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """The tool finds the scales of any board, by the odometry and, for turns, also by the gyro.
+    """The tool finds the scales of any board within five times the stated standard deviation.
 
-    The error is at most five times the standard deviation that the tool states.
+    The scales come from the odometry and, for turns, also from the gyro.
     """
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
@@ -83,7 +81,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 ) -> None:
     """Each planned command is a whole number of the board's counts, and not faster than ``top``.
 
-    There is one exception: if one count is already faster than ``top``, the command is one count.
+    If one count is already faster than ``top``, the command is one count.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -92,10 +90,9 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """While the tool measures a speed, no commands are logged for a time.
+    """The tool does not use a speed during which no commands are logged for a time.
 
-    In this time, the driver's command timeout may have stopped the robot. So the tool does not use
-    the measurement of this speed.
+    The driver's command timeout may have stopped the robot.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
@@ -107,7 +104,7 @@ def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
 def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
     """If the gyro and the odometry differ by 5 %, a note recommends ``calibrate geometry``.
 
-    If they differ by only 2 %, this is within the gyro's tolerance, and there is no such note.
+    A difference of 2 % is within the gyro's tolerance.
     """
     found = speeds(drive((70.0, 70.0, 500.0), gyro=1.05), ASSUMED, UP, NO_BIAS)
     assert any("calibrate geometry`, load" in note for note in result(found, NOW).notes)
@@ -125,10 +122,10 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """The tool reports an error if it cannot find a scale. There are two cases.
+    """The tool reports an error if it cannot find a scale.
 
-    In the first log, no speed is steady. In the second log, the robot moves in the opposite
-    direction of its commands.
+    * No speed in the log is steady.
+    * The robot moves in the opposite direction of its commands.
     """
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)

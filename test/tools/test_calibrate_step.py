@@ -24,10 +24,10 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wheel B has another motor. ``calibrate step`` finds the motor's constants within 5 %.
+    """``calibrate step`` finds the constants of the motor of wheel B within 5 %.
 
-    On a busy computer, commands arrive late, and the tool may warn that the steps differ. In this
-    case, the test begins the calibration again, as the warning advises.
+    If a busy computer makes the steps differ, the test calibrates again, as the tool's warning
+    advises.
     """
     monkeypatch.setattr(step, "RUN_UP_S", 1.0)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:

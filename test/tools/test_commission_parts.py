@@ -108,10 +108,9 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """One axis is commanded, and the user answers with one of the 27 patterns of wheel directions.
+    """A pattern of wheel directions gives an axis the sign 1 or -1, or is a contradiction.
 
-    The pattern in the commissioning guide gives the sign 1, and its reverse gives -1. All other
-    patterns are contradictions.
+    The pattern in the commissioning guide gives 1, and its reverse gives -1.
     """
     expected = wanted(axis)
     if pattern == expected:
@@ -197,11 +196,7 @@ def test_a_sensor_mounted_askew_stays_so() -> None:
 def test_a_side_lowered_instead_of_raised_is_a_contradiction(
     nose_rad: float, left_rad: float
 ) -> None:
-    """A tilt in the wrong direction is a contradiction.
-
-    The user lowers the nose or the left side instead of raising it. The axes that are computed from
-    this would be left-handed.
-    """
+    """A tilt in the wrong direction is a contradiction: the computed axes would be left-handed."""
     level, nose_up, left_up = postures(rotation(math.pi, 0, 0), nose_rad, left_rad)
     with pytest.raises(Contradiction, match="repeat both tilts"):
         mounting(level, nose_up, left_up)
@@ -228,8 +223,8 @@ def resting(
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
     """A turn by hand is accepted only if it is to the left and large enough.
 
-    Otherwise, ``require_left_turn`` raises Contradiction. It measures the angle about the vertical,
-    and subtracts the gyro's bias.
+    For other turns, ``require_left_turn`` raises Contradiction. The angle is measured about the
+    vertical, without the gyro's bias.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
@@ -314,11 +309,11 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """Two motions, before and after a turn, show whether the driver assumes the right delta frame.
+    """Two equal commands, before and after a turn, show whether the assumed delta frame is right.
 
-    The robot gets the same command in both motions. With the right frame, the odometry shows the
-    same direction in the axes of the body. With the wrong frame, the direction changes by the angle
-    of the turn. Any other change is an error.
+    * Right frame: the direction of the odometry in the body's axes is unchanged.
+    * Wrong frame: the direction changes by the angle of the turn.
+    * Any other change: an error.
     """
 
     def heading(rad: float) -> Drift:
@@ -333,11 +328,9 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """The tool finds out from a turn on the spot whether the driver interprets deltas correctly.
+    """A turn on the spot shows whether the driver interprets deltas correctly.
 
-    The robot turns at 0.5 rad/s. In a delta of 40 ms, it turns by 20 mrad, and each wheel by 24
-    counts. If the driver interprets these numbers in the wrong way, the odometry shows another
-    motion.
+    In a delta of 40 ms at 0.5 rad/s, the robot turns by 20 mrad, and each wheel by 24 counts.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
@@ -350,8 +343,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 def test_a_drift_is_of_its_time_alone() -> None:
     """``drift`` computes the velocity only from the odometry between the two given times.
 
-    It raises an error if there is no odometry between them. ``require_motion`` raises an error if
-    the robot does not move.
+    ``drift`` raises an error without such odometry; ``require_motion`` raises one without motion.
     """
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))

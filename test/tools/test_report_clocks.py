@@ -14,9 +14,9 @@ from omnibot_driver.tools.report.judge import judge
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """Timestamps jump ahead by 20 ms, and then slowly become right again.
+    """Timestamps that jump ahead and slowly become right are reported as a jump, not as a gap.
 
-    This happens if the driver could not read for some time. The report calls it a jump, not a gap.
+    The cause is a driver that could not read for some time.
     """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
@@ -60,11 +60,9 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
 
 @pytest.mark.parametrize("ahead_s", [3.0, -3.0])
 def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: float) -> None:
-    """The recorder's clock is 3 s ahead of the robot's clock, or 3 s behind it.
+    """If the recorder's clock is 3 s off, the report names only the difference of the clocks.
 
-    The robot drives as commanded. After the drive, the e-stop is latched. The report names only the
-    difference of the clocks. It does not say that the robot moved without a command, or that it
-    moved against a command.
+    The report does not say that the robot moved without a command, or against one.
     """
     drive = Drive(estops=[(0.0, False), (16.5 + ahead_s, True)])
     for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):
@@ -77,11 +75,7 @@ def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: flo
 
 @pytest.mark.parametrize("by_s", [3.65e9, -3600.0, -3.0, 0.5])
 def test_a_step_of_the_recorders_clock_is_told_and_is_no_delay(by_s: float) -> None:
-    """The clock of the recording computer is set during the drive, so it steps.
-
-    The report has one finding about this step, and no other trouble. It does not say that messages
-    wait, or that the robot moved without a command.
-    """
+    """The report has one finding about a step of the recorder's clock, and no other trouble."""
     drive = Drive()
     for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):
         topic.late_s = topic.late_s + by_s * (topic.stamp_s > 8.0)

@@ -71,9 +71,9 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """The board is lost for a while. The report mentions this loss once, from the driver's state.
+    """The report mentions a loss of the board once, from the driver's state.
 
-    The loss also causes gaps in the board's data. The report does not mention these gaps.
+    Gaps in the board's data that the loss causes are not mentioned.
     """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
@@ -103,9 +103,9 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """The messages of a topic end early. The report shows a gap up to the end of the log.
+    """If the messages of a topic end early, the report shows a gap up to the end of the log.
 
-    If the driver's state explains the early end, for example by a pause, the report shows no gap.
+    There is no gap if the driver's state, for example a pause, explains the early end.
     """
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
@@ -237,10 +237,9 @@ def beside(drive: Drive, *streams: dict[str, str]) -> Log:
 
 
 def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
-    """A recording has an OmniBot and a MART, whose odometry has different rates.
+    """A recording of an OmniBot and a MART does not show which rate each odometry should have.
 
-    The report gives the measured rate of each, and does not say what it should be. The rate of the
-    IMU can only belong to the robot with an IMU.
+    The rate of the IMU can only belong to the robot with an IMU.
     """
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.odom, name, getattr(drive.odom, name)[::2])
@@ -274,10 +273,11 @@ def test_the_imu_of_another_robot_is_not_expected(
     topics: tuple[str, ...],
     level: Level | None,
 ) -> None:
-    """A robot sent no message of an IMU, and there is another robot.
+    """The finding about missing IMU messages depends on which of two robots have an IMU.
 
-    If only one of the two has an IMU, only a topic shows that it is this robot. This is also true
-    if the other robot has only diagnostics in the recording.
+    * Both, or this robot by its topics: BAD.
+    * One of the two: NOTE.
+    * None: no finding.
     """
     drive.imu.drop(0.0, 99.0)
     for alone in (False, True):

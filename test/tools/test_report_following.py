@@ -64,10 +64,10 @@ def test_slow_motors_that_reach_the_commanded_speed_are_good(slow_s: float) -> N
 
 
 def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
-    """The motors are slow, and the robot reaches only 80 % of the commanded yaw rate.
+    """If the robot reaches only 80 % of the commanded yaw rate, the report gives this ratio.
 
-    The report gives this ratio. For a robot with two wheels, the report does not advise to change
-    the scale of the odometry, because only a tape measure shows whether the odometry is wrong.
+    The motors are slow. For two wheels, the advice is a tape measure, not another scale of the
+    odometry.
     """
     commands = stretches(3.0)
     found = verdict(commands, behind(commands, 0.3) * [1.0, 1.0, 0.8])
@@ -80,9 +80,9 @@ def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
 
 @pytest.mark.parametrize("wheels", [TWO_WHEELS, ("wheel_a", "wheel_b", "wheel_c")], ids=len)
 def test_commands_that_always_change_give_no_advice_on_scales(wheels: tuple[str, ...]) -> None:
-    """The commands always change, and the motors are too slow for them. The scales are right.
+    """If the commands always change, the only advice is to record constant commands.
 
-    The report gives the ratios in a note. Its only advice is to record constant commands.
+    The motors are too slow, but the scales are right. The report gives the ratios in a note.
     """
     commands = wave(3.0)
     found = verdict(commands, behind(commands, 0.5), wheels)

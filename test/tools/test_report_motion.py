@@ -77,10 +77,9 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """IMU or odometry messages are lost for 2 s during a turn.
+    """The report does not compare gyro and wheels in a gap of IMU or odometry messages.
 
-    The report does not compare gyro and wheels in this gap. In the rest of the log, they agree, so
-    the finding of the report is good.
+    In the rest of the log, gyro and wheels agree, so the finding is good.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)

@@ -143,10 +143,7 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """The calculated angle of a motor in the manual's control loop fits its calculated speeds.
-
-    The angle at the end of a tick is the sum of the speeds up to this tick, times the tick period.
-    """
+    """The calculated angle of a motor is the sum of the calculated speeds times the tick period."""
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
     speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5)
@@ -158,9 +155,8 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """The proposed gains keep the limits of Ms (maximum sensitivity) and overshoot.
 
-    Compared with the manual's gains, they reduce the error after a load change. The error after a
-    command may become larger, but not by as much. For each of the two errors, the ratio is the new
-    error divided by the old one. The sum of the two ratios is less than 2.
+    Compared with the manual's gains, the error after a load change is smaller. For the errors after
+    a load change and after a command, the ratios of new to old error have a sum below 2.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

@@ -59,8 +59,8 @@ def test_a_name_that_is_no_address_is_refused(url: str) -> None:
 def test_what_may_appear_later_is_not_refused(url: str) -> None:
     """A port is accepted if a later attempt to open it may succeed.
 
-    For example, the device is missing, or the host is unknown. Other ports must be opened to find
-    out whether they work.
+    Examples: the device is missing, the host is unknown, or only opening shows whether the port
+    works.
     """
     check_address(url)
 
@@ -83,9 +83,9 @@ def test_a_link_whose_device_is_unplugged_is_not_refused(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("url", ["loop://", "rfc2217://localhost:5000"])
 def test_a_port_without_descriptor_is_refused_for_a_board_with_several(url: str) -> None:
-    """A board has several lines, and one port has no file descriptor. This port is refused.
+    """For a board with several lines, a port without a file descriptor is refused.
 
-    The reason: the driver polls all lines together, and needs a descriptor for each of them.
+    The driver polls all lines together, by their descriptors.
     """
     check_address(url)
     with pytest.raises(ParameterError, match="does not work for a board with several ports"):
@@ -99,10 +99,9 @@ def test_a_port_with_a_descriptor_is_accepted_for_a_board_with_several(url: str)
 
 
 def test_a_check_opens_nothing() -> None:
-    """The driver checks the address of a port without opening the port.
+    """The check of a port's address does not open the port.
 
-    Opening the port during the check could do harm: it could restart the board, and it would keep
-    other programs from opening the port.
+    Opening could restart the board, and would keep other programs from opening the port.
     """
     ours, theirs = os.openpty()
     try:

@@ -110,9 +110,9 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
 @pytest.mark.parametrize("scheme", ["rfc2217", "RFC2217"])
 def test_a_board_behind_rfc2217_is_served_as_well(scheme: str) -> None:
-    """The port is on a server that uses RFC 2217, here pyserial's example server.
+    """A port on a server that uses RFC 2217 works like a local one.
 
-    The port works like a local one. Upper and lower case in the URL's scheme mean the same.
+    Here, it is pyserial's example server. Upper and lower case in the URL's scheme mean the same.
     """
     board_side = serial.serial_for_url("loop://", timeout=0.05)
     listener = socket.create_server(("127.0.0.1", 0))

@@ -41,8 +41,7 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 ) -> None:
     """For each error that prevents the opening of a port, the message has advice.
 
-    In this test, a substitute for pyserial raises the errors. Without it, some errors could not
-    occur: if root runs the test, the kernel refuses no access.
+    A substitute for pyserial raises the errors: the kernel, for example, refuses root no access.
     """
 
     def refuse(*_: object, **__: object) -> None:
@@ -112,10 +111,9 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A port makes a real terminal exclusive until the port is closed.
+    """A port makes a real terminal, but not a pseudo-terminal, exclusive until the port is closed.
 
-    While the terminal is exclusive, only root can open it again. This also keeps out programs that
-    use no locks. The port never makes a pseudo-terminal exclusive.
+    Only root can then open the terminal again. This also keeps out programs that use no locks.
     """
 
     def exclusive() -> bool:
@@ -159,8 +157,7 @@ def test_a_write_that_is_taken_in_pieces_is_completed(
 ) -> None:
     """The port completes a long write that the kernel accepts only in parts.
 
-    It writes each further part when the other end has read. The test allows a long time for this,
-    because the other end reads slowly on a busy computer.
+    The test sets a long timeout, because the other end reads slowly on a busy computer.
     """
     monkeypatch.setattr("omnibot_driver.transports.serial_port.WRITE_TIMEOUT_S", PATIENCE_S)
     port = SerialPort(terminal.path, 115200)

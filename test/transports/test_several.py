@@ -25,7 +25,7 @@ from omnibot_driver.transports.several import Several
 class Ends:
     """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends.
 
-    ``paths`` are links to the driver's ends. The link of a lost line is removed, because another
+    ``paths``: links to the driver's ends. The link of a lost line is removed, because another
     program may get a terminal of the same name.
     """
 
@@ -130,7 +130,7 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 
 
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
-    """One line is full. A write does not wait for it. The other line gets its data at once.
+    """A write does not wait for a full line, and the other line gets its data at once.
 
     Later the full line is reported as missing, and its old data is discarded.
     """
@@ -171,10 +171,9 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A line's buffer is full, so the driver will close this line and open it again.
+    """The driver does not share a full line with the guard.
 
-    The driver does not share a full line with the guard. If it did, the guard would keep the port
-    locked, and the driver could not open the port again.
+    Otherwise the guard would keep the port locked, and the driver could not open it again.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])

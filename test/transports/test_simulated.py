@@ -58,10 +58,9 @@ def test_a_read_ends_without_a_packet() -> None:
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """A read waits for data, and another thread interrupts it. The read returns without data.
+    """A read that waits for data returns without data if another thread interrupts it.
 
-    Closing a transport must interrupt a waiting read. Otherwise, the read of a paused board would
-    often last until its time limit, because a paused board seldom sends data.
+    Otherwise, closing the transport of a paused board would often wait for the read's time limit.
     """
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
@@ -152,10 +151,9 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The thread of the board fails. A read then raises RuntimeError with the cause.
+    """If the board's thread fails, a read and the close raise RuntimeError. The read has the cause.
 
-    It does not raise the error of a lost line. Closing the board raises RuntimeError, too, and
-    leaves nothing behind.
+    The error of a lost line is not raised.
     """
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:

@@ -167,10 +167,7 @@ def test_a_host_that_may_appear_later_is_not_refused(host: str) -> None:
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
-    """A URL has an IPv6 address, and a write to its second channel fails, so the host is lost.
-
-    The error has the address in brackets, and the port of the second channel.
-    """
+    """The error about a lost host has the IPv6 address in brackets, and the port of the channel."""
     lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
     with contextlib.closing(UdpPorts("udp://[::1]:5000", 2)) as transport, lost:
         transport.write(((1, bytes(100_000)),))

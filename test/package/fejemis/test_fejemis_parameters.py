@@ -27,11 +27,7 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """The driver writes the user's parameters to the boards in the boards' units.
-
-    The command ``confw`` writes radii, gear, ticks and track; ``confs`` writes track and steering
-    distance; ``fwoffset`` writes an angle in degrees.
-    """
+    """The driver writes the user's parameters to the boards in the boards' units."""
     values = check(
         wheel_radii=[0.08, 0.081],
         gear=20.0,
@@ -69,11 +65,7 @@ def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: 
 
 
 def test_a_track_alone_is_refused() -> None:
-    """The driver refuses ``track`` without the other parameters of a command that contains it.
-
-    Two commands contain ``track``, and each needs further values. The driver cannot know which
-    command the user wants.
-    """
+    """The driver refuses ``track`` alone: two commands contain it, and both need further values."""
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)
 

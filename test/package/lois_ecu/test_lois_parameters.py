@@ -12,8 +12,8 @@ from omnibot_driver.core.errors import ParameterError
 def test_commands_are_slow_in_a_terminal_mode() -> None:
     """In a terminal mode, a command rate above 25 Hz is refused.
 
-    In such a mode, the public firmware forwards each command to a sensor, for example a compass at
-    4800 baud. With more commands, the board would receive a stop late or never.
+    The firmware forwards each command to a sensor at 4800 baud, so a stop would arrive late or
+    never.
     """
     with pytest.raises(ParameterError, match="at most 25 Hz"):
         PARAMETERS.check_all({"terminal_mode": "compass", "command_rate": 30.0})
@@ -31,7 +31,7 @@ def test_the_description_of_max_wheel_speed_names_every_topic_that_it_limits() -
 def test_what_the_board_keeps_is_unset_by_default() -> None:
     """Settings and periods that the board keeps are unset by default, so nothing is written.
 
-    Bug: the driver wrote the periods of the ticks and of the odometry, 0.2 s, by default.
+    Bug: the driver wrote periods of 0.2 s by default.
     """
     values = PARAMETERS.check_all({})
     assert {name: values[name] for name in (*PERIODS, *SETTINGS)} == dict.fromkeys(

@@ -58,10 +58,9 @@ def all_of(port: int) -> Iterator[bytes]:
 
 @pytest.mark.slow
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """No program reads the terminal. The board continues to send.
+    """If no program reads the terminal, it keeps the oldest bytes; later bytes are counted.
 
-    The terminal keeps only the oldest bytes, up to a limit. The test allows twice ``UNREAD_LIMIT``,
-    because a busy kernel counts bytes late.
+    The test allows twice ``UNREAD_LIMIT``, because a busy kernel counts bytes late.
     """
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
@@ -142,10 +141,9 @@ def test_waiting_for_what_does_not_come_ends_with_false() -> None:
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """The thread of a board fails with an exception.
+    """After a board's thread has failed, waiting for the board and closing it raise RuntimeError.
 
-    Then a call that waits for the board raises RuntimeError, and closing the board raises
-    RuntimeError, too. Each RuntimeError has the exception of the thread as its cause.
+    The cause of each RuntimeError is the exception of the thread.
     """
 
     class BrokenBoard(Ticker):
@@ -186,10 +184,7 @@ def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
-    """A second simulator replaces the link of the first simulator. Then the first simulator ends.
-
-    It does not remove the link, because the link now leads to the terminal of the second simulator.
-    """
+    """A simulator does not remove its link after another simulator has replaced the link."""
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)):
         second = PtyBoard(Ticker(), str(link))
@@ -202,10 +197,9 @@ def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "link to a file"])
 def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
-    """The user wants a link, but a file or a link to a file already has its name.
+    """The simulator never replaces a file, or a link to a file, by its own link.
 
-    The simulator keeps the file, and ends with a message that says what to do. It leaves no file
-    descriptor open.
+    The error says what to do, and no file descriptor stays open.
     """
     precious = tmp_path / "precious"
     precious.write_text("data")

@@ -78,10 +78,11 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """A user asks for symbolic links that cannot all be made. The program makes none of them.
+    """If one of the requested symbolic links cannot be made, the program makes none of them.
 
-    There are three cases. The board has fewer serial ports than the user gives links. A file
-    already has the name of a link. The board has only a UDP port.
+    * The board has fewer serial ports than links.
+    * A file already has the name of a link.
+    * The board has only a UDP port.
     """
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):

@@ -53,8 +53,7 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
     """The delay of a datagram is measured in the board's simulated time, not in real time.
 
-    The network delays each datagram by up to 10 s. It loses some of them, and delivers others
-    twice.
+    Some datagrams are lost, and some arrive twice.
     """
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
@@ -70,11 +69,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """The arrival time of a late datagram is a time of the caller's clock, not of the board's.
-
-    The caller sends a datagram at 1000 s of its own clock. The network delays the datagram by up to
-    1 s. The board's own clock shows a different time.
-    """
+    """The arrival time of a late datagram is a time of the caller's clock, not of the board's."""
     at: list[float] = []
 
     class Watch(ToyServer):

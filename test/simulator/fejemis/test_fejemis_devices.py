@@ -9,10 +9,9 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """``brush`` turns the brush on or off. At 6 V, the lift takes 12 s from end to end.
+    """``brush`` switches the brush. ``motv`` moves the lift for a time, or until ``motv`` with 0 V.
 
-    The command ``motv`` has a voltage and a time. The lift stops after this time, or if another
-    ``motv`` sets 0 V.
+    At 6 V, the lift takes 12 s from end to end.
     """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")
@@ -115,11 +114,7 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """A configuration without a gyro offset is loaded after a calibration of the gyro.
-
-    The command to load it is ``eer`` or ``setid 0``. The loaded configuration replaces the
-    calibrated offset, so the yaw drifts.
-    """
+    """After a gyro calibration, ``eer`` or ``setid 0`` removes the offset, so the yaw drifts."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)

@@ -137,10 +137,9 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """One half is silent, hung or unplugged for a time. The other half sends as usual.
+    """While one half is silent, hung or unplugged, the other sends, and the robot drives on.
 
-    A silent half sends nothing but obeys commands. A hung or unplugged half does not obey commands.
-    In all cases, the robot drives on with its last command.
+    Only a silent half still obeys commands.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
@@ -184,11 +183,7 @@ def test_faults_can_be_planned() -> None:
 
 
 def test_ports_can_be_swapped_and_ids_be_others() -> None:
-    """The ids in the heartbeats show which half is at a port.
-
-    In the first case, the two ports are swapped. In the second case, a half has another id than
-    usual.
-    """
+    """The heartbeats show the ids of the halves, also with swapped ports or an unusual id."""
     rig = Rig(swapped=True)
     rig.run(1.0)
     assert any(port == FRONT and " 90 " in text for _, port, text in rig.lines)
@@ -240,10 +235,9 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """The angle sensor has three faults, one after the other: frozen, absent, in error.
+    """A frozen angle sensor repeats its angle; the angle line shows an absent or faulty sensor.
 
-    A frozen sensor repeats its angle without an error, so the steering runs to its end stop. An
-    absent sensor and a sensor in error can be recognised in the angle line.
+    With a frozen sensor, the steering runs to its end stop.
     """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")

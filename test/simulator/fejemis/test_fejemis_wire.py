@@ -157,9 +157,9 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """Each value has a key in the help text, by which the host requests it or subscribes to it.
+    """A host can request each value of the help text, or subscribe to it, by the value's key.
 
-    Each reply begins with the key, with one exception: the reply to ``ir`` begins with ``irc``.
+    Each reply begins with the key; only the reply to ``ir`` begins with ``irc``.
     """
     rig = Rig().booted()
     rig.say(port, "leave")
@@ -285,10 +285,9 @@ def test_the_two_clocks_run_apart() -> None:
 
 @pytest.mark.slow
 def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
-    """The clock of one Teensy is fast, that of the other Teensy is slow.
+    """Each Teensy sends a heartbeat every 0.4 s by its own clock, which is fast or slow.
 
-    Each Teensy sends a heartbeat every 0.4 s by its own clock. So the time in a heartbeat is a
-    multiple of 0.4 s, or up to a millisecond later. A millisecond is the duration of a cycle.
+    The time in a heartbeat is a multiple of 0.4 s, or later by at most one cycle (1 ms).
     """
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.1)

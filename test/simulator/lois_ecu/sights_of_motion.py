@@ -2,8 +2,8 @@
 
 """Detectors of quirks in motion: how a board counts ticks, and how it measures and controls speeds.
 
-A quirk is a deviation from the manual. Each function is named after a quirk, and returns
-whether a board with ``quirks`` shows this quirk.
+A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
+the quirk after which the function is named.
 """
 
 import math
@@ -46,8 +46,7 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 def velocity_may_be_nan(quirks: Quirks) -> bool:
     """Return whether some velocities that are reported in a straight drive are not finite.
 
-    Both wheels start together with the same duty, so many of their ticks coincide. Ticks that
-    coincide can make the board divide by zero.
+    If ticks of both wheels coincide, the board can divide by zero.
     """
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60), SetDuty(60, 60))

@@ -2,8 +2,8 @@
 
 """Detectors of quirks in communication: what a board receives, sends and records.
 
-A quirk is a deviation from the manual. Each function is named after a quirk, and returns
-whether a board with ``quirks`` shows this quirk.
+A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
+the quirk after which the function is named.
 """
 
 from dataclasses import replace
@@ -173,11 +173,7 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """Return whether the board delivers only one ball in six seconds.
-
-    With this quirk, the board ignores a second request directly after the first one. It obeys a
-    third request 6 s later.
-    """
+    """Return whether the board ignores a ball request less than 6 s after the previous ball."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())
@@ -282,7 +278,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 def slow_boot(quirks: Quirks) -> bool:
     """Return whether the board sends nothing and obeys nothing in the first 2 s after power-up.
 
-    A command that arrives in these 2 s is not lost: the board obeys it afterwards.
+    The board obeys commands from these 2 s afterwards.
     """
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))

@@ -33,10 +33,7 @@ def test_every_quirk_has_its_sight() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """Each quirk has a detector, which finds the quirk on a board with the public firmware.
-
-    If only this quirk is switched off on the board, its detector does not find it.
-    """
+    """A detector finds its quirk on the public firmware, but not if this quirk is switched off."""
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 

@@ -41,8 +41,7 @@ BOTH = pytest.mark.parametrize("quirks", [DOCUMENTED, FIRMWARE], ids=["documente
 def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
     """Without a request, the board sends all periodic messages except the date.
 
-    All of them arrive undamaged. Their periods are about 400 ms, 1 s and 1.2 s. The public firmware
-    also appends the odometry to the ticks.
+    All arrive undamaged, with periods of about 400 ms, 1 s and 1.2 s.
     """
     rig = Rig(quirks)
     heard = rig.run(22.0)
@@ -232,8 +231,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 def test_the_gps_moves_with_the_robot() -> None:
     """The reported longitude agrees with the robot's x axis, which points east.
 
-    The robot drives more than 4 m and stops. The test allows an error of 5 cm, because the
-    longitude is a 32-bit float and therefore rounded.
+    The longitude is a 32-bit float and therefore rounded, so the test allows an error of 5 cm.
     """
     rig = Rig(DOCUMENTED)
     rig.drive(20, 20, 20.0)
@@ -244,10 +242,9 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """After a reboot, the board is silent for 2 s and has lost all its state.
+    """A reboot makes the board silent for 2 s, and resets everything but the robot's true pose.
 
-    Its tick counts are zero. Its low-pass filter is not set, so it obeys no speed command. Only the
-    robot's true pose is unchanged.
+    The tick counts are zero. The low-pass filter is not set, so the board obeys no speed command.
     """
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)

@@ -84,10 +84,9 @@ def test_a_negative_distance_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TB 0", "MCF 0", "MCB 0", "MCF far"])
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
-    """A move has the distance zero, or a word instead of a distance.
+    """A move with the distance zero, or a word as distance, has no limit on the public server.
 
-    On the public server, such a move has no limit. If the public server's quirk
-    ``zero_distance_is_unlimited`` is off, the server refuses the move.
+    Without the quirk ``zero_distance_is_unlimited``, the server refuses the move.
     """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"

@@ -2,8 +2,7 @@
 
 """Tests of the public server's uncontrolled motions: F, B, RM, R and L.
 
-The commands F and RM drive forward. B drives backward. R and L turn on the spot. SM stops F, B, R
-and L. SRM stops RM.
+F and RM drive forward, B backward; R and L turn on the spot. SM stops F, B, R and L; SRM stops RM.
 """
 
 import pytest
@@ -26,7 +25,7 @@ def test_rm_answers_in_71_ms() -> None:
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
     """The reply to the drive F comes after 220 ms, and the reply to the turn R after 61 ms.
 
-    F takes longer, because the server measures the bias of the gyro before this drive.
+    For F, the server first measures the bias of the gyro.
     """
     rig = Rig()
     assert rig.ask("F") == "ok"
@@ -37,10 +36,9 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """Some servers answer the start of a drive (RM) with a failure, but the robot moves.
+    """Some servers answer RM (drive forward) with a failure, but the robot moves.
 
-    The server believes that no motion is in progress. So the stop SRM fails, and the robot moves
-    on. Only MCS, the direct control of the motors, stops it.
+    The stop SRM then fails. Only MCS, the direct control of the motors, stops the robot.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -122,10 +120,9 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """A motor is stuck, so the forward drive RM fails. The server gives no reason.
+    """With a stuck motor, the drives RM and F fail. F gives the reason "start timedout".
 
-    Then the drive F fails with the reason "start timedout". After that, RM fails with this reason,
-    too.
+    RM gives this reason only after F has failed.
     """
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
@@ -171,7 +168,7 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """CS and RMCS change the speed. They have two numbers: for the right motor, then for the left.
+    """CS and RMCS change the speed of the right motor (first number) and of the left motor.
 
     A positive number makes a motor turn more forward, also in the backward drive B.
     """
@@ -209,10 +206,9 @@ def test_cs_5_minus_5_turns_left() -> None:
     ],
 )
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
-    """A speed change (CS or RMCS) cannot reverse a motor. It stops the motor instead.
+    """A speed change (CS or RMCS) stops a motor, but does not reverse it.
 
-    It cannot make a motor faster than full speed either. If a motor would exceed full speed, the
-    other motor becomes slower instead.
+    If one motor would exceed full speed, the other motor becomes slower instead.
     """
     rig = Rig()
     rig.drive(start, 0.5)
@@ -344,8 +340,8 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
     """A backward drive (B) ends if the rear sonar measures less than 15 inches.
 
-    The robot has already moved 2 inches when the sonar measures for the first time. So an obstacle
-    that was 15.5 inches behind at the start also ends the drive.
+    The robot moves 2 inches before the first measurement, so an obstacle at 15.5 inches ends the
+    drive.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)

@@ -25,10 +25,7 @@ def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24"])
 def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: str) -> None:
-    """A move is requested while the IMU is dead, so the move does not start.
-
-    Minutes later, the IMU works again. Then the move starts, although the host has given it up.
-    """
+    """A move requested while the IMU is dead starts minutes later, when the IMU works again."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=300.0)
     rig.say(text)
     rig.run(299.0)

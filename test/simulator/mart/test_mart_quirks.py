@@ -2,9 +2,9 @@
 
 """Tests that each quirk of the simulated MART server can be observed, and can be switched off.
 
-A quirk is a deviation from the manual. A function named after a quirk returns whether a server
-shows this quirk. F, B and RM are drives, R and L spins, TF and MCR controlled moves. SM and SRM
-are stops; SL and SS are stops on the stop port.
+A quirk is a deviation from the manual; a function named after a quirk detects it. F, B and RM are
+drives, R and L spins, TF and MCR controlled moves. SM and SRM are stops; SL and SS are stops on the
+stop port.
 """
 
 from collections.abc import Callable
@@ -25,10 +25,9 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether a drive (F) counts as in progress after SL has stopped it.
+    """Return whether a drive (F) counts as in progress after SL has stopped it on the stop port.
 
-    SL is a stop on the stop port. If the drive still counts as in progress, the server refuses
-    other motions, and the usual stop (SM) hangs the command port.
+    The server then refuses other motions, and the usual stop (SM) hangs the command port.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -74,11 +73,7 @@ def left_spin_in_reference_move(quirks: Quirks) -> bool:
 
 
 def moves_wait_for_imu(quirks: Quirks) -> bool:
-    """Return whether a drive (F) waits for a missing IMU.
-
-    The server then does not answer F at first. When the IMU is back, the server answers F, and the
-    robot drives.
-    """
+    """Return whether the reply and the motion of a drive (F) wait until a missing IMU is back."""
     rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
     rig.say("F")
     answer = rig.wait(59.0)
@@ -335,9 +330,9 @@ def test_a_documented_server_stops_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """A controlled move is stopped 0.02, 0.12 or 1 s after its start.
+    """On a server that follows the manual, a stop ends a controlled move at any time.
 
-    A server that follows the manual replies to the move within 1 s, and the robot is at rest.
+    The reply to the move comes within 1 s of the stop.
     """
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):

@@ -81,10 +81,7 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
-    """A change of speed (RMCS) comes with one number instead of two. The server refuses it.
-
-    For some other commands, such as CS, the server does not check how many numbers come.
-    """
+    """The server refuses a change of speed (RMCS) with one number instead of two."""
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == "fail improper command format"
@@ -125,10 +122,9 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 
 
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
-    """The speed change CS comes with one number instead of two while the robot is at rest.
+    """At rest, the server refuses CS with one number instead of two, and does not crash.
 
-    The server refuses CS before it reads the numbers, so it does not crash. During the drives F and
-    B, the same command crashes it.
+    During the drives F and B, the same command crashes the server.
     """
     assert Rig().ask("CS 5") == "fail"
 
@@ -146,10 +142,9 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server restarts while the robot moves. The new server knows of no motion.
+    """A restarted server knows of no motion, so the stop SRM fails and the robot moves on.
 
-    So the stop SRM fails with "no motion in progress". Only a power cycle of the controller stops
-    the motors.
+    Only a power cycle of the controller stops the motors.
     """
     rig = Rig()
     rig.drive("RM 30")
@@ -177,11 +172,10 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """A sonar measures three times if an obstacle is near. This makes its reply later.
+    """A sonar measures three times if an obstacle is near, so its reply comes later.
 
-    In this test, the obstacle in front is near, so the front sonar measures three times. The
-    obstacle behind is farther away than 15 inches, the limit of the rear sonar. So the rear sonar
-    measures once.
+    Here, the front obstacle is near; the rear obstacle is beyond the rear sonar's limit of 15
+    inches.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"

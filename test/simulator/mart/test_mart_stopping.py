@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of stops on the public server.
+"""Tests of stops on the public server: what each stop ends, and which sequences hang the server.
 
-The tests show which motions each stop ends, and which sequences of commands hang the server.
-
-F, B and RM are drives, R and L are spins. SM and SRM are stops on the command port. SL and SS are
-stops on the stop port. The server never replies on the stop port.
+F, B and RM are drives, R and L are spins. SM and SRM are stops on the command port, SL and SS on
+the stop port. The server never replies on the stop port.
 """
 
 import pytest
@@ -55,9 +53,9 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """During a spin, SS on the stop port stops the robot. The stop SM on the command port follows.
+    """After SS on the stop port has stopped a spin, the reply to SM has the angle of the spin.
 
-    The reply to SM has the angle of the spin, and the server accepts the next motion.
+    The server then accepts the next motion.
     """
     rig = Rig()
     rig.drive("R")
@@ -109,9 +107,9 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """A stop on the stop port (SL or SS) ends a motion. Then a stop comes on the command port.
+    """After SL or SS on the stop port has ended a drive, SM or SRM hangs the command port for ever.
 
-    This stop (SM or SRM) makes the command port hang for ever. The motors are off.
+    The motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -203,10 +201,10 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 
 
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
-    """SL on the stop port comes while a controlled move still measures the gyro's bias.
+    """A stop (SL) in the first moments of a controlled move is ignored, or ends the move late.
 
-    If SL comes 0.03 s after the start, the server ignores it and completes the move. If SL comes
-    0.1 s after the start, the robot drives on, and the move ends only about 0.85 s after SL.
+    * 0.03 s after the start: the server completes the move.
+    * 0.1 s after the start: the robot drives on, and the move ends about 0.85 s after SL.
     """
     rig = Rig()
     rig.say("TF 24")
@@ -291,9 +289,9 @@ def test_the_stop_port_is_never_answered() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
-    """A stop of the drive F takes more than 0.75 s. The server reports it as failed.
+    """A stop of the drive F that takes more than 0.75 s is reported as failed.
 
-    A stop of the forward drive RM is reported as ok, even if it takes up to 1.88 s.
+    A stop of the drive RM is reported as ok, even if it takes up to 1.88 s.
     """
     rig = Rig()
     rig.ask("SLMP 1 60")

@@ -98,10 +98,9 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """R reboots the board. The board's odometry and sequence number are then zero.
+    """R resets the board's odometry and sequence numbers, but not the true pose of the robot.
 
-    Only the board begins anew: the true pose of the robot does not change. The host must wake the
-    board again.
+    The host must wake the board again.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
@@ -131,11 +130,7 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A paused board does not obey motion frames. It reads their bytes as state letters.
-
-    The first frame contains R (0x52), so the board resets. The second frame contains P (0x50), so
-    the board starts.
-    """
+    """A paused board reads the bytes of motion frames as letters: R resets it, and P starts it."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
     assert mode_of(board) is BoardMode.BOOTING
@@ -147,10 +142,9 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """A board that is not awake gets a motion frame. The first three bytes wake it and are lost.
+    """The first three bytes of a frame wake a sleeping board; the next bytes act as letters.
 
-    The board reads the next bytes as letters. In this test, they contain the letter R (0x52), so
-    the board resets.
+    Here, the letter R (0x52) resets the board.
     """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
@@ -206,8 +200,7 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
     """A receiver that looks for idle gaps discards an incomplete frame after a gap.
 
-    A caller can give the simulated board the arrival times of the bytes. Then the board computes
-    the gap from these times. Without such times, it measures the gap in ticks.
+    The board computes the gap from the arrival times, or from ticks if the caller gives no times.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

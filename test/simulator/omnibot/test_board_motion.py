@@ -138,9 +138,9 @@ POSITION = BoardSettings(running=True, control="position")
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],
 ) -> None:
-    """A board's switch is on "position", so a command is a pose in the earth frame, in mm and mrad.
+    """With the switch on "position", a command is a pose in the earth frame, in mm and mrad.
 
-    If the commanded heading is more than a full turn, the robot turns by the whole angle.
+    For a heading of more than a full turn, the robot turns by the whole angle.
     """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))
@@ -162,9 +162,9 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """With the switch on "position", zeros in a frame of mode 1 command a drive to the origin.
+    """With the switch on "position", zeros in mode 1 command a drive to the origin.
 
-    So the stop frame must have another mode: it has mode 2, and it stops the robot.
+    The stop frame has mode 2, and stops the robot.
     """
     board = SimulatedBoard(
         BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))

@@ -89,10 +89,7 @@ def test_a_motors_delay_holds_its_effort_back() -> None:
 
 
 def test_the_controllers_gains_are_those_given() -> None:
-    """The commanded speed of a wheel jumps from 0 to 10, and the gains are 5, 2 and 1.
-
-    After one tick, the effort is 80: the sum of the gains, times 10.
-    """
+    """After a jump of the commanded speed by 10, the effort is 10 times the sum of the gains."""
     gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
     assert WheelController(gains).update(10.0, 0.0) == 80.0
 
@@ -111,10 +108,9 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """The IMU of a tilted robot measures gravity in the axes of its mounting.
+    """The IMU of a tilted robot measures gravity in the axes of the IMU's mounting.
 
-    The robot is held at an angle. Both this angle and the mounting of the IMU turn the measured
-    gravity. REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
+    REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
     """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)
@@ -123,10 +119,9 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 
 
 def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
-    """If a robot is turned by hand, its gyro measures the turn, but its wheels do not turn.
+    """If a robot is turned left by hand, the upside-down gyro reads a negative rate.
 
-    Someone turns the robot to the left. The gyro is mounted upside down, so it reads a negative
-    rate.
+    The wheels do not turn.
     """
     board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
     board.hold(yaw_rate=radians(30))

@@ -143,9 +143,9 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """If a stop frame lacks a byte, a counting receiver takes the next frame's first FF for it.
+    """A counting receiver completes a stop frame that lacks a byte by the next frame's first FF.
 
-    So the last word of the stop frame is 255, and wheel C turns at 255 LSB.
+    So wheel C turns at 255 LSB.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
@@ -185,8 +185,7 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
     """A window receiver obeys a stop frame that lacks a byte, and also the complete frame after it.
 
-    The receiver needs nine bytes, so it takes the first FF of the second frame as the ninth byte of
-    the first. It also uses this FF as the beginning of the second frame.
+    The first FF of the second frame counts for both frames.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
@@ -195,10 +194,7 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """A window receiver finds a second frame in the middle of a frame that contains FF FE.
-
-    A word of the first frame has the value -2, so its bytes are FF FE, like a header.
-    """
+    """A window receiver finds a second frame within a frame whose first word is -2 (FF FE)."""
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
     assert understood(data, kind=WINDOW) == [first, second]
@@ -251,11 +247,7 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """The board needs three bytes to wake up. Two bytes arrive during the boot.
-
-    Some receivers count these two bytes, so they need only one more. Others do not count them, and
-    need three more.
-    """
+    """Some receivers count bytes from the boot among the three bytes that wake the board."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()

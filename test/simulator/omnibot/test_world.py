@@ -72,9 +72,9 @@ def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """The slip of the wheels is random, depends on the seed, and is 10 % on average.
+    """With a slip of 10 % on average, the robot turns by 90 % of the angle that the encoders show.
 
-    So the robot turns by only 90 % of the angle that the encoders show.
+    The slip is random and depends on the seed.
     """
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)

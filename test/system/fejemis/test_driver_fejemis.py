@@ -234,11 +234,9 @@ def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
 def test_a_calibration_of_the_board_ends_the_drivers_own_bias(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver subtracts biases, and the user calibrates the board's gyro and accelerometer.
+    """When a calibration has removed the board's bias, the driver's own bias becomes 0.
 
-    Then the board's readings have no bias any more, so the driver's own biases become 0.
-
-    Regression: the driver still subtracted its biases, so the calibrated readings had an error.
+    Regression: the driver still subtracted its bias, so the calibrated readings had an error.
     """
     robot = robot_of(stack, tmp_path)
     biases = {"gyro_bias": [0.0, 0.0, 0.1], "accel_bias": [0.0, 0.0, 0.5]}
@@ -265,12 +263,10 @@ def test_a_calibration_of_the_board_ends_the_drivers_own_bias(
 def test_power_off_is_refused_while_driving(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """A user calls ``~/power_off`` during a drive. The driver refuses.
+    """The driver refuses ``~/power_off`` during a drive. At rest, the power goes off after a delay.
 
-    At rest, the driver accepts the call, and the power goes off after a delay.
-
-    On a busy computer, the robot may already be at rest at the first call, so the driver accepts
-    this call. Then the test cancels the power-off by ``~/start`` and tries again.
+    On a busy computer, the robot may be at rest too early. Then the test cancels the power-off by
+    ``~/start`` and tries again.
     """
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))

@@ -28,9 +28,9 @@ STOP = "rc 2 0 0"
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """One of the two Teensys is unplugged during a drive. The driver stops the motors of the other.
+    """If a Teensy is unplugged during a drive, the driver stops the motors of the other Teensy.
 
-    When the unplugged Teensy is plugged in again, the driver stops its motors, too.
+    When the unplugged Teensy is back, the driver stops its motors, too.
     """
     said = len(driver.lines)
     assert probe.call(SetBool, "brush", data=True).success
@@ -54,10 +54,9 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_brush_that_cannot_be_switched_off_now_is_no_success(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """The front board is unplugged while the brush is on. Then the user switches the brush off.
+    """While the front board is unplugged, switching the brush off fails; the answer names the port.
 
-    This service call fails, and its answer names the missing port. When the front board is plugged
-    in again, the driver switches the brush off.
+    The driver switches the brush off when the front board is plugged in again.
     """
     assert probe.call(SetBool, "brush", data=True).success
     robot.wait_until(lambda board: board.vehicle.brush)
@@ -101,10 +100,9 @@ def test_nothing_is_promised_while_both_ports_are_missing(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """If one of the two Teensys restarts or falls silent during a drive, the robot is stopped.
+    """If a Teensy restarts or falls silent during a drive, the driver stops the robot.
 
-    The driver stops the robot although the commands continue. When both Teensys work again, the
-    robot obeys new commands.
+    When both Teensys work again, the robot obeys new commands.
     """
     said = len(driver.lines)
     with driven(probe, robot):

@@ -49,10 +49,9 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """The policy lets other enclaves use only the driver's topics and services, and common topics.
+    """The policy lets other enclaves use only what the driver has, and the topics of every node.
 
-    Common topics are those that every node uses, such as /rosout. Only the operator may call
-    services and publish lift commands.
+    Only the operator may call services and publish lift commands.
     """
     every = rules()
     driver = every.pop("/omnibot/driver")

@@ -24,8 +24,8 @@ RAW: Final = [
 RECOGNISED: Final = 100
 """Number of packets that a recording needs from each Teensy, so that a replay recognises it.
 
-A recording may lack a Teensy's answers to the driver's first questions. Then the replay recognises
-the Teensy only by later packets. A Teensy sends this number of packets in 1 s or more.
+The Teensy's answers to the driver's first questions may be missing. A Teensy sends these packets in
+1 s or more.
 """
 
 

@@ -2,7 +2,7 @@
 
 """Fixtures: a driver, and a simulated LOIS ECU that follows the manual or the public firmware.
 
-For each firmware, all tests of a module use the same ECU and driver, except those that use ``new``.
+The tests of a module share one ECU and driver for each firmware, except those that use ``new``.
 """
 
 from collections.abc import Callable, Iterator

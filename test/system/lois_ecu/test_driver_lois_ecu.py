@@ -49,13 +49,10 @@ New = tuple[Ecu, Driver, Probe]
 def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board(
     firmware: str, stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> None:
-    """The robot drives 0.6 m and stops when the commands end. Odometry is within 3 cm of the truth.
+    """Odometry is right within 3 cm after a drive, and continues across a restart of the board.
 
-    The driver replaces the board's own controller gains, with which the robot would swerve.
-
-    Then the board restarts. The driver writes its gains and the period of the ticks again, and the
-    robot obeys new commands. The pose in odom continues from its value before the restart. At the
-    end, the error of the pose is at most 8 cm, or at most 3 sigma if this is more.
+    After the restart, the driver writes its controller gains and the period of the ticks again. The
+    final error is at most 8 cm, or 3 sigma if this is more.
     """
     ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", ticks_period=0.2, **GAINS))
@@ -129,11 +126,7 @@ def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> 
 def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """A user presses the board's button during a drive. The e-stop is latched, and the robot stops.
-
-    When the user releases the button, the e-stop remains latched. Only the service ~/estop releases
-    the e-stop.
-    """
+    """The board's button stops the robot and latches the e-stop; only ``~/estop`` releases it."""
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
     with driven(probe, ecu):
@@ -150,10 +143,9 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
-    """A user calls ``~/reset`` after a drive.
+    """``~/reset`` sets the board's tick counts to 0, but the pose in odom continues.
 
-    The board's tick counts become 0, but the pose in odom continues. When the wheels start, a
-    report may correct the pose by 0.15 m, because the board keeps its own period of 400 ms.
+    When the wheels start, a report may correct the pose by 0.15 m: the board reports every 400 ms.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)

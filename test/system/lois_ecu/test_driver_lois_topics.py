@@ -29,10 +29,9 @@ NODE: Final = "omnibot_driver"
 
 
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """The services switch the LED on and off. The driver sends the ball command exactly once.
+    """The services switch the LED, and send the ball command exactly once.
 
-    The board may miss this single ball command, because it cannot receive while it sends. The
-    driver does not repeat it, because the board could then drop two balls.
+    The board may miss the command while it sends, but a repetition could drop a second ball.
     """
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
@@ -48,10 +47,9 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The compass shows east, and the declination is 0.1 rad. The published heading is -0.1 rad.
+    """If the compass shows east and the declination is 0.1 rad, the published heading is -0.1 rad.
 
-    The heading is in the ENU frame, in which east is 0 and left is positive. Magnetic east is 0.1
-    rad to the right of true east. GPS position and time are published, too.
+    In the ENU frame, east is 0 and left is positive. GPS position and time are published, too.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
@@ -85,10 +83,9 @@ def test_a_fix_of_the_public_firmware_is_none(
 def test_duties_are_commanded_in_duty_mode_and_one_that_waited_is_refused(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A duty command arrives while the driver is suspended, and is refused when the driver resumes.
+    """The driver refuses a duty command that waited while the driver was suspended.
 
-    The driver knows that this command waited, although the message has no timestamp. It obeys later
-    duties, and limits them to ``max_duty``. The duties expire like other commands.
+    Later duties are obeyed, limited to ``max_duty``, and expire like other commands.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
@@ -140,10 +137,10 @@ def test_duty_cmd_is_a_topic_of_its_own(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A user sets the terminal mode "gps". The board's lines appear on the topic ~/terminal.
+    """The terminal mode and the drive mode can be changed while the driver runs.
 
-    Then the user sets the terminal mode "host" again, and the drive mode "duty". The driver obeys
-    the topic ``duty_cmd`` of this drive mode without a restart.
+    * Terminal mode "gps": ``~/terminal`` has the board's lines.
+    * Drive mode "duty": the driver obeys ``duty_cmd``.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
@@ -166,8 +163,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 def recorded(robot: Any) -> Path:
     """Record while the robot drives, and return the path of the record.
 
-    If the computer is busy, the robot may stop early, and the record fails. Then this function
-    records again, at most ten times in all.
+    On a busy computer, a record may fail, so the function tries at most ten times.
     """
     for _ in range(10):
         try:
@@ -183,7 +179,7 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
 ) -> None:
     """The calibration tool records the ticks of both wheels during a drive, and stops the robot.
 
-    Then the e-stop is latched, so the driver refuses a record. The tool reports the reason.
+    While the e-stop is latched, a record fails, and the tool reports the reason.
     """
     leave_events_out(monkeypatch)
     monkeypatch.setattr(listener, "LOST_S", 3.0)  # for a busy computer

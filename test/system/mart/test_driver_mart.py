@@ -310,8 +310,7 @@ def test_a_driver_that_hangs_is_guarded(new: New) -> None:
 def test_its_services_answer(new: New, tmp_path: Path) -> None:
     """The services calibrate the gyro, start the log, and download the last move and the log.
 
-    A second file of the same name does not replace the first one. The download of the log ends the
-    MART server.
+    A second download gets a new file name. The download of the log ends the MART server.
     """
     mart, _driver, probe = new
     with driven(probe, mart, 0.3, 0.0):
@@ -336,10 +335,9 @@ def test_its_services_answer(new: New, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """A user sets ``range_maximum`` to the integer 4, and ``dock_distance`` to 0.1 m (3.9 inches).
+    """New values of ``range_maximum`` and ``dock_distance`` take effect while the driver runs.
 
-    The driver publishes the new maximum. To dock, it requests a move of only 2 inches, because the
-    robot may drive 1.6 times as far as requested.
+    For 0.1 m, the driver requests only 2 inches: the robot may drive 1.6 times as far as requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)

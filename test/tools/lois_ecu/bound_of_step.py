@@ -6,14 +6,12 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are chosen at random, as in ``judge_step.py``. A *mark* is a place on the encoder's
-disc at which the board counts a tick. The calculation is for three kinds of noise:
+The robots are random, as in ``judge_step.py``. A *mark* is a place on the encoder's disc at which
+the board counts a tick. For each kind of noise, load and rate change by 0.5 % between records:
 
 - "each time": every time between ticks has an independent error of 10 %.
 - "other marks": the marks are displaced by 10 %, differently in each turn.
-- "same marks": the marks have known positions. The only noise is the rounding to 0.1 ms.
-
-For each kind of noise, the load and the rate change by 0.5 % between records.
+- "same marks": the positions of the marks are known; times are rounded to 0.1 ms.
 """
 
 from random import Random

@@ -96,9 +96,9 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """Misplaced marks change the times between ticks by 10 %. The fit finds the marks' places.
+    """The fit finds misplaced marks, which change the times between ticks by 10 %.
 
-    The remaining error is less than 1 %. It comes from the rounding of the board's clock.
+    The remaining error of less than 1 % comes from the rounding of the board's clock.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -145,10 +145,9 @@ def test_records_that_are_too_short_are_refused() -> None:
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """An encoder has short and long ticks alternately, and the board has missed some edges.
+    """If short and long ticks alternate, the tool finds a correction factor for each kind.
 
-    The tool finds a correction factor for the short ticks, and one for the long ticks. The first
-    tick may be a short or a long one.
+    The first tick may be short or long, and the board may miss some edges.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -178,11 +177,10 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """The board's controller is delayed while the board sends data.
+    """If the board sends data during a step, the overshoot becomes only a little larger.
 
-    Data during a step therefore makes the overshoot larger, but only a little. If the board does
-    not send, the tuned gains have an overshoot of at most 5 %. If it sends, 95 % of the overshoots
-    are below 8 %.
+    * No data: the tuned gains have an overshoot of at most 5 %.
+    * With data: 95 % of the overshoots are below 8 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
@@ -296,8 +294,7 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
     """The tool refuses a record in which every time is the largest number that the record can hold.
 
-    The true times may be longer, so they are unknown. This happens if the unit is 100 ns, as in the
-    manual: the largest number then means 6.6 ms, and the usual times between ticks are longer.
+    In the manual's unit, 100 ns, this number means 6.6 ms; the true times may be longer.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"

@@ -26,11 +26,10 @@ def test_whoever_has_gains_as_parameters_can_do_it() -> None:
 def test_a_robot_is_calibrated_from_its_records(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
+    """``calibrate step`` finds the constants of both wheels, and sets corrections and gains.
 
-    ``calibrate step`` finds the constants of both wheels, and sets corrections and gains in the
-    driver. All of these values are allowed in the calibration file. The user has set no period, so
-    the board keeps its own.
+    The robot has marks that are 10 % off, unequal wheels, dead time and backlash. The calibration
+    file may have all values found. The board keeps its own period.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
@@ -65,10 +64,9 @@ def test_a_robot_is_calibrated_from_its_records(
 def test_a_limit_that_reduces_the_full_duty_is_named(
     tmp_path: Path, limit: str, value: float
 ) -> None:
-    """A parameter of the driver limits the duty to less than the tool commands.
+    """The tool ends with an error if a parameter of the driver reduces the full duty.
 
-    The tool ends with an error that names the parameter. If the tool measured with the smaller
-    duty, the measured gain and dead zone would be wrong, and so would the gains.
+    Otherwise, the measured gain and dead zone would be wrong. The error names the parameter.
     """
     robot = SimulatedRobot(tmp_path, random_motors(5))
     robot.set_parameters({limit: value})
