@@ -152,9 +152,9 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
     """The parameter descriptions say about an IMU only what is true for the board.
 
-    * If the board subtracts the gyro bias itself: ``gyro_bias`` does not refer to
+    * The board subtracts the gyro bias itself: ``gyro_bias`` does not refer to
       ``~/calibrate_gyro``.
-    * Only the parameters of the OmniBot quote the noise of an IMU.
+    * Only the OmniBot's parameters quote the noise of an IMU.
     """
     profile = boards.load(name)
     traits = profile.make(boards.check_all({"board": name})).traits

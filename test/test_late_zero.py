@@ -2,8 +2,8 @@
 
 """Tests of a zero command that arrives too late while the robot drives to a goal.
 
-The driver refuses the command, but usually ends the goal: goals do not expire, and a released
-joystick sends its zero command only once.
+The driver refuses the command, but usually ends the goal: a goal does not expire, and a joystick
+sends its zero only once.
 """
 
 import math
@@ -104,7 +104,7 @@ def test_a_late_zero_is_refused_but_ends_a_goal(
 ) -> None:
     """A zero command that is too old is refused, but ends the drive to a goal.
 
-    The robot stops well before the goal, and a notice gives the reason.
+    A notice gives the reason.
     """
     bench, topic = on_the_way(monkeypatch)
     topic.action = action
@@ -130,7 +130,7 @@ def test_a_late_velocity_and_nan_do_not_end_a_goal(
 def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -> None:
     """A late zero command is refused, and the velocity command of cmd_vel stays in effect.
 
-    The velocity command may be newer than the zero, and expires by itself.
+    The velocity command may be newer than the zero.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)

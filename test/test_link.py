@@ -73,8 +73,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 ) -> None:
     """The guard process gets at most ten heartbeats a second, even if the pacer runs more often.
 
-    The driver replaces a guard with many unread heartbeats, so a higher rate would affect slow
-    guards.
+    The driver would replace a slow guard if more heartbeats were unread.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -151,8 +150,7 @@ def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proof
 ) -> None:
     """The longest possible shutdown of a link is shorter than the time limit of the driver's end.
 
-    The link waits as long as possible for two proofs of a standstill. Time is left for the guard's
-    last words.
+    The shutdown contains two proofs of a standstill, and the guard's last words.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S
@@ -179,7 +177,7 @@ def test_every_read_and_every_write_can_be_listened_to(
 ) -> None:
     """``on_read`` gets all bytes that the link reads, and ``on_write`` all bytes that it writes.
 
-    ``on_write`` also gets the final Stop. ``on_read`` gets no bytes from before the link's start.
+    ``on_read`` gets no bytes from before the link's start.
     """
     end_patiently(monkeypatch)
     read, written = [], []
@@ -240,7 +238,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
     """The driver reports once that a guard process cannot share a port of this kind (``loop://``).
 
-    Without a guard process, only the driver itself can stop the robot.
+    Only the driver itself can then stop the robot.
     """
     listener = Listener()
     link = link_to("loop://", listener, session())

@@ -81,10 +81,9 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
     full: bool, terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """At an end without a proof of rest, the content of the port decides what the guard does.
+    """When a link ends without a proof of rest, its guard discards only the data of a full port.
 
-    * The port has accepted the link's last packets: the guard keeps them in the buffer.
-    * The port is full of old commands: the guard discards them.
+    Otherwise, the port may still hold the link's last packets.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

@@ -175,7 +175,7 @@ def test_an_overrun_is_counted_once_although_another_line_is_lost_and_comes_back
 ) -> None:
     """When a lost line is opened again, the total number of overruns of all lines is unchanged.
 
-    The kernel counts the overruns of the new connection from 0.
+    The kernel counts the new connection from 0.
     """
     overruns = {lines.drive.path: 5, str(lines.name): 3}
     monkeypatch.setattr(SerialPort, "overruns", property(lambda port: overruns[port._url]))

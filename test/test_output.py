@@ -76,8 +76,7 @@ with UnblockedOutput():
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
     """A message at the program's end does not block, even if nothing reads the output.
 
-    * The program has filled the pipe exactly: 16 blocks of 4096 bytes.
-    * The program has printed more than the pipe can hold: 100 blocks.
+    16 blocks of 4096 bytes fill the pipe exactly; 100 blocks are more than the pipe can hold.
     """
     program = f"""
 import contextlib, os, time

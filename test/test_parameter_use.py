@@ -103,7 +103,7 @@ UNLIKE_THE_ROW = {"mart": {"speed_per_unit"}, "fejemis": {"wheelbase_m"}}
 def test_the_settings_have_the_defaults_of_the_parameters(board: str) -> None:
     """The defaults of a board's settings are the same as the defaults of its parameters.
 
-    The test also fails if the function ``settings`` leaves a field out, or exchanges two fields.
+    So the function ``settings`` leaves no field out, and exchanges no fields.
     """
     settings = boards.load(board).settings(boards.check_all({"board": board}))
     defaults = type(settings)()

@@ -184,7 +184,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
     """The driver passes on the result of a request before the simulated clock has begun.
 
-    Measurements need a stamp, so the driver does not publish them before the clock has begun.
+    Measurements wait for the clock, because they need a stamp.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -216,7 +216,7 @@ WITHOUT_STAMP = (
 def test_what_needs_no_stamp_does_not_wait_for_simulated_time(node: Node, value: object) -> None:
     """Records and changes of state are passed on before the simulated clock has begun.
 
-    Otherwise, ~/record_rpm would answer only after 120 s, and a press of the button would be lost.
+    Otherwise, a press of the e-stop button, which is reported once, would be lost.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
@@ -251,7 +251,7 @@ def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
 ) -> None:
     """If a pause begins and ends within one read, later subscribers get the state "nominal".
 
-    Another thread publishes "paused" during the read, so "nominal" must be published afterwards.
+    Another thread publishes "paused" during the read.
     """
     session, publishing = session_with(node)
     published: list[str] = []

@@ -146,7 +146,7 @@ def test_the_bag_of_another_board_names_the_missing_lines_and_the_board(
 ) -> None:
     """If a bag is of another board, the message names the needed lines and those in the bag.
 
-    The message asks to check the parameter ``board``. Topics of sent bytes are not named.
+    Topics of sent bytes are not named.
     """
     present = [RX + name for name in recorded]
     sent = "/omnibot_driver/raw_tx"
@@ -206,8 +206,7 @@ def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
 ) -> None:
     """From the bag of a killed recorder, the replay has every complete packet, and no more.
 
-    The replay then says what is incomplete, even after ``ros2 bag reindex``. The bag is not
-    changed.
+    The replay says what is incomplete, and does not change the bag.
     """
     path = bag(tmp_path / "bag", RX)
     file = path / "bag.mcap"

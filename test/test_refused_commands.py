@@ -65,7 +65,7 @@ def test_a_sender_of_refused_commands_does_not_pause(
 ) -> None:
     """A sender of refused commands is not silent, so its next valid command is refused, too.
 
-    After a stop by the motion monitor, motion is refused until the sender was silent for a time.
+    The motion monitor has stopped the robot: motion is refused until the sender is silent.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -101,8 +101,7 @@ def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
 ) -> None:
     """A refused command does not bring back a refusal of motion that has already ended.
 
-    After a stop by the motion monitor, this refusal ends when the sender pauses for
-    ``cmd_vel_timeout``.
+    The refusal after the motion monitor's stop ends when the sender pauses.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

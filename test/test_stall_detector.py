@@ -2,8 +2,8 @@
 
 """Tests of the stall detector, which finds stalls of the pacer, the thread that repeats commands.
 
-The method ``outlived_by`` returns False for a command that may have waited during a stall. The
-tests call such a command *refused*.
+The tests call a command *refused* if ``outlived_by`` returns False: the command may have waited
+during a stall.
 """
 
 import pytest
@@ -88,7 +88,7 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 def test_a_standstill_long_ago_is_forgotten() -> None:
     """A command that seems to come from a stall that ended 98 s ago is not refused.
 
-    No command is in transit for that time, so the sender's clock must be wrong.
+    The sender's clock must be wrong.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)

@@ -290,7 +290,7 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """The second message of a sender has two possible times of sending.
 
-    * Estimated from the first message, which was late by 0.5 s: 0.5 s too late.
+    * From the first message, which was late by 0.5 s: 0.5 s too late.
     * By the sender's clock: right here.
     """
     receiver, sender = Receiver(), Sender()

@@ -2,7 +2,7 @@
 
 """Tests that the driver makes few Python calls for the data of one tick (10 ms) of a running board.
 
-Each test has a bound for the number of calls. A change that raises a bound gives its reason in
+Each test bounds the number of calls. A change that raises a bound gives its reason in
 docs/internals/performance.md.
 """
 
@@ -76,7 +76,7 @@ def most_calls(
 ) -> dict[int, float]:
     """Run ``work`` for each tick of a running board, and return its mean numbers of Python calls.
 
-    The key is the kind of tick: the number of bytes that the board sends in it.
+    The keys are the numbers of bytes that the board sends in a tick.
     """
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}

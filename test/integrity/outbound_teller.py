@@ -2,8 +2,7 @@
 
 """A minimal simulation of a board's reports, without any code of the driver.
 
-The reported motion is the twist that the driver sent last, even if the line damaged the command. So
-the reports do not reveal the damage.
+The reported motion follows the commands as sent, so it shows no damage of the line.
 """
 
 import math

@@ -2,8 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-A running board reports motion if the driver sends motion commands, or if the last received
-set-point is a motion. A change of the board's state appears in its reports after one or two ticks.
+The board reports motion if the driver sends motion commands, or if the last received set-point is a
+motion. A change of state appears in the reports after one or two ticks.
 """
 
 import math
@@ -34,9 +34,9 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
-* Key: the bytes held before, whether the line was idle then, and the new bytes.
+* Key: the bytes held before, whether the line was idle, and the new bytes.
 * Value: the bytes held afterwards, and the frames found, each with the position of its last byte.
-* ``None``: the receiver has found a letter; the new bytes must be processed one by one.
+* ``None``: a letter was found; the new bytes must be processed one by one.
 """
 
 
@@ -75,7 +75,7 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    The constructor plays the scene until the faults of the line begin; ``run`` plays the rest.
+    The constructor plays the scene until the line has faults; ``run`` plays the rest.
 
     ``memo``: cached results, which trials with the same kind of receiver may share.
     """

@@ -11,13 +11,12 @@ Words = tuple[int, int, int]
 class Items:
     """The control frames and letters in a write.
 
-    ``frames``: the last byte's offset, the mode and the words of each control frame.
+    ``frames``: offset of the last byte, mode and words of each control frame.
 
-    ``letters``: the offset and the byte of each letter.
+    ``letters``: offset and byte of each letter.
 
-    ``moves``: whether the write contains a motion frame.
-
-    ``stops``: whether the write contains control frames, but no motion.
+    ``moves``: whether a control frame is a motion. ``stops``: whether there are control frames, but
+    no motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()

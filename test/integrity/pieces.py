@@ -2,7 +2,7 @@
 
 """Common parts of the integrity reports: damage to a stream in pieces, and sums of scores.
 
-The module does not know the format of frames. Scores need only the operator ``+=``.
+The format of frames is not used here. Scores need the operator ``+=``.
 """
 
 import os

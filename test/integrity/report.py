@@ -2,9 +2,8 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: first seed. Use seeds
-below 1000: the others served to tune the OmniBot's decoder. The exit code is 1 when a bound is
-missed.
+``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: first seed; seeds from
+1000 on served to tune the OmniBot's decoder. The exit code is 1 when a bound is missed.
 """
 
 import argparse

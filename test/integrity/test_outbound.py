@@ -2,8 +2,7 @@
 
 """Short trials of boards that read the driver's bytes from a damaged line; tests of the judge.
 
-The judge compares what the board understood with what the driver sent. ``outbound.py`` has the long
-trials.
+The judge compares what the board understood with what the driver sent.
 """
 
 from copy import copy

@@ -83,8 +83,7 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
     """Return about one in ``number`` of all combinations of one choice from each list.
 
-    With three or more lists of at least ``number`` choices, each pair of choices from different
-    lists occurs.
+    With three or more lists of at least ``number`` choices, any two choices occur together.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [
@@ -222,10 +221,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder restores its state after any earlier frame by evaluating at most 6 frames again.
-
-    The restored states equal those of a decoder that evaluates all frames one by one.
-    """
+    """The decoder restores its state after any frame by evaluating at most 6 frames again."""
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]
@@ -268,7 +264,7 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
     """``least_costs`` is a lower bound of the cost from each node of the trellis to the end.
 
-    The bound is 0 at the end, and along an edge it falls by at most the edge's cost.
+    Along an edge, the bound falls by at most the edge's cost, and it is 0 at the end.
     """
     least = least_costs(data)
     search = trellis._Search(

@@ -97,8 +97,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 def test_what_the_driver_tells_is_explained() -> None:
     """The troubleshooting guide has a row for each message of the driver.
 
-    The row contains the beginning of the message, or the message contains all parts that the row
-    quotes.
+    The row contains the beginning of the message, or quotes parts of the message.
     """
 
     def is_explained(template: str) -> bool:

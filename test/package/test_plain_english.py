@@ -2,8 +2,7 @@
 
 """Tests of the repository's English: phrases that were hard to read are rejected.
 
-A phrase matches only whole words, so names such as ``nobody_waits`` are not found. A phrase may
-span a line break.
+A phrase matches whole words, also across a line break; names such as ``nobody_waits`` do not match.
 """
 
 import ast

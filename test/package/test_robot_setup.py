@@ -93,8 +93,7 @@ def unit_settings() -> dict[str, list[str]]:
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
     """The systemd unit starts the driver by ``exec``, so signals reach the driver itself.
 
-    The command names a parameter file, but no port: the names of port parameters depend on the
-    board.
+    The command names no port: the names of port parameters depend on the board.
     """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command

@@ -2,8 +2,7 @@
 
 """Make the pictures of the README and the documents, except those that no program can make.
 
-``make pictures`` runs this program. It runs two modules at a time, each in its own process; their
-``main(folder)`` writes the pictures.
+``make pictures`` runs this program. It runs ``main(folder)`` of two modules at a time.
 """
 
 import os

@@ -50,9 +50,8 @@ def pose(origin: Any) -> Array:
 class Hits:
     """The points where rays enter and leave a solid, and the normals of its surface there.
 
-    ``rays``: for each element of the other arrays, the index of the ray.
-
-    ``near``, ``far``: distances at which a ray enters and leaves.
+    ``rays``: for each element of the other arrays, the index of the ray. ``near``, ``far``:
+    distances along the ray.
     """
 
     rays: NDArray[np.intp]

@@ -2,8 +2,8 @@
 
 """Picture of squares of 5 m that a simulated LOIS ECU drives: the true path, and ``odom``'s path.
 
-The robot drives one square to each side with each firmware variant. The program prints the errors
-of ``odom`` as table rows.
+There is one square to each side for each firmware variant. The program also prints ``odom``'s
+errors.
 """
 
 import math

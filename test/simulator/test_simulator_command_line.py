@@ -54,7 +54,7 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
 def test_in_the_background_it_leaves_the_terminal_to_other_programs() -> None:
     """A simulator started with ``&`` does not read the terminal, and ends at SIGTERM.
 
-    If it read the terminal, the kernel would suspend it, and SIGTERM would not end it.
+    The kernel would suspend a background program that reads the terminal.
     """
     user, terminal = os.openpty()
     os.write(user, b"quit\n")

@@ -2,9 +2,9 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-* ``odo``: the board answers ``ok X`` with its position X in m.
-* ``move D``: the board drives D m at 0.5 m/s, then answers ``ok X``.
-* ``stop``: the board answers ``fail stopped`` to the move, and ``ok`` to the stop.
+* ``odo``: the answer is ``ok X``, with the position X in m.
+* ``move D``: after a drive of D m at 0.5 m/s, the answer is ``ok X``.
+* ``stop``: the answer is ``ok``, and the move's answer is ``fail stopped``.
 """
 
 import argparse

@@ -56,8 +56,8 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
-    The probe repeats a message that the driver refused because of a stall, and a call whose answer
-    was lost.
+    The probe repeats messages that were refused because of a stall, and calls whose answer was
+    lost.
     """
 
     def start(driver: Driver) -> Probe:
@@ -100,8 +100,8 @@ def shared_probe(
 ) -> Iterator[Probe]:
     """A probe of the shared driver, for one test.
 
-    At the beginning, the robot is at rest, the e-stop is released, and the recorded commands and
-    output are empty. At the end, the fixture latches the e-stop.
+    The test begins at rest, with the e-stop released, and without earlier commands and output.
+    Afterwards, the e-stop is latched.
     """
     board, driver = shared
     probe = probe_of(driver)

@@ -30,7 +30,7 @@ The search begins at the delta that fits the message's timestamp.
 LONGEST_STALL = 1000
 """Number of frames to search in each direction for the IMU frame that matches a message.
 
-After a stall of the computer, the matching frame may be far from the message's timestamp.
+After a stall, the frame may be far from the message's timestamp.
 """
 
 Triple = tuple[float, float, float]
@@ -223,10 +223,10 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return the deltas in a board's frames, the poses after them, and the indices of IMU frames.
+    """Return the deltas in a board's frames, the pose after each delta, and an IMU index for each.
 
-    After every fifth delta, the board sends its exact pose. The other poses are the last exact pose
-    plus the rounded deltas since then. An index is that of the last IMU frame before the delta.
+    A pose is the exact one that the board sends after every fifth delta, or the last exact pose
+    plus the rounded deltas since then. The index is that of the last IMU frame before the delta.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

@@ -36,8 +36,7 @@ class Driver:
 
     ``before``: Python code that runs before the driver, in its process.
 
-    ``interpreter``: whether the driver runs in a new interpreter, which also runs exit handlers. If
-    not, a process that has imported the driver forks it.
+    ``interpreter``: whether to run a new interpreter, with exit handlers, instead of a fork.
 
     ``more``: further ROS arguments.
     """

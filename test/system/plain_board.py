@@ -2,7 +2,7 @@
 
 """Profile of a board with few features: two wheels and ``cmd_vel``, but no IMU and no pause.
 
-A simulated OmniBot serves as the board. The profile adds one topic and one service.
+A simulated OmniBot serves as the board.
 """
 
 from collections.abc import Callable, Mapping

@@ -52,8 +52,7 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end of the tests.
 
-    Otherwise the end of a probe would delete the middleware's participant, and Fast DDS might
-    crash.
+    Fast DDS has crashed when the end of a probe deleted the middleware's participant.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)
@@ -169,10 +168,9 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again after some seconds.
+        """Publish the probe's newest message again after some seconds, when a stall is over.
 
-        By then, a stall is over, and the driver would log a second refusal, too: it logs each kind
-        of refusal once in ``WARN_EVERY_S`` (s).
+        The driver then logs a second refusal, too: it logs each kind once in ``WARN_EVERY_S`` (s).
         """
 
         def publish() -> None:

@@ -47,7 +47,7 @@ def probe(shared_probe: Probe) -> Probe:
 def repeated(probe: Probe, publisher: Any, message: object) -> Iterator[None]:
     """Publish a message at 5 Hz while the context lasts.
 
-    The driver logs each kind of refusal at most once in 2 s, so one refusal may not be logged.
+    The driver logs each kind of refusal at most once in 2 s, so a single message may not suffice.
     """
     timer = probe.node.create_timer(0.2, lambda: publisher.publish(message))
     try:

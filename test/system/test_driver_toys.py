@@ -96,7 +96,7 @@ def test_a_toy_drives_and_is_heard_and_obeys_the_estop(
 ) -> None:
     """A toy robot obeys cmd_vel and the e-stop, and odom shows the motion.
 
-    The robot stops when the commands end. After the release of the e-stop, commands move the robot.
+    The robot stops when the commands end, and moves again after the release of the e-stop.
     """
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")

@@ -54,7 +54,7 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received a motion command.
 
-    One press may not be enough: a program may stall, or a subscription may not be discovered yet.
+    A press may be lost by a stall, or before the subscription is discovered.
     """
     for _ in range(20):
         said.clear()
@@ -163,7 +163,7 @@ def test_who_lets_go_of_the_key_stops_the_robot(
 ) -> None:
     """When the user releases the key, the monitor stops the robot by some zero commands.
 
-    At its end, the monitor sends one more zero command.
+    The monitor sends one more zero command when it ends.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

@@ -132,8 +132,7 @@ def stamp(
     """Generate one stream and stamp its samples.
 
     ``loss``: share of lost bytes. ``skew``: relative error of the board's tick; positive if it is
-    too long. ``event``: key of ``EVENTS_S``, for the middle of the stream. The host begins to read
-    in the first second.
+    too long. ``event``: key of ``EVENTS_S``. The host begins to read in the first second.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = stream_of(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)

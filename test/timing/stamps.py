@@ -49,9 +49,8 @@ def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
 def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
     """Return the lines of a Markdown table with one row for each case.
 
-    A row has the worst and the median result, and the number of streams that keep both limits
-    (``LIMITS_S``). ``head``: headings of the case's columns. ``rows``: results of the streams, by
-    case.
+    A row has the worst and the median result, and how many streams keep ``LIMITS_S``. ``head``:
+    headings of the case's columns. ``rows``: results by case.
     """
     lines = [
         f"| {head} | steps, RMS error (ms) | 99 % within (ms) | streams that keep both limits |",

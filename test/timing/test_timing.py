@@ -17,7 +17,7 @@ SCENARIOS = pytest.mark.parametrize(
 def test_lost_bytes_shift_no_stamps(line: str, scenario: str, skew: float) -> None:
     """If one byte in 1000 is lost, the intervals between stamps are even within 0.2 ms (RMS).
 
-    99 % of the stamps are right within 0.5 ms, apart from a constant offset and the first 2 s.
+    99 % of the stamps are right within 0.5 ms, after 2 s and apart from a constant offset.
     """
     stamped = stamp(line, scenario, 1e-3, skew, 0, 10.0)
     assert stamped.unevenness() < 0.2e-3
@@ -64,8 +64,7 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
     """An FTDI adapter's timer that never cuts a frame delays the stamps by the duration of a frame.
 
-    The driver can determine the timer's phase exactly only from cut frames. The delay is tested
-    after 2 s, to within 0.5 ms.
+    The driver can determine the timer's phase exactly only from cut frames.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within
@@ -80,7 +79,7 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str, skew: float) -> None:
     """The stamps are as accurate as usual if a busy computer reads late.
 
-    Readers that read in parts are left out: some of their stamps are wrong by a tick.
+    Readers in parts are left out: some of their stamps are wrong by a tick.
     """
     stamped = stamp(reader, scenario, 0.0, skew, 0, 10.0)
     assert spread(stamped.errors()) < 0.5e-3

@@ -61,9 +61,8 @@ class Rig:
     def calibrate(self, *words: str, answer: Answer = yes, draws: bool = True) -> int:
         """Run a calibration in this process, and return its exit code.
 
-        ``draws``: whether the picture is drawn, which takes a second.
-
-        A calibration that failed because the computer was too busy is repeated.
+        ``draws``: whether to draw the picture, which takes a second. If the computer was too busy,
+        the calibration is repeated.
         """
 
         def read(question: str) -> str:

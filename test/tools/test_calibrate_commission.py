@@ -76,9 +76,9 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_a_speed_limit_is_not_taken_for_positional_control(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If ``max_linear_speed`` is below a speed that it needs, the tool asks for a higher limit.
+    """The tool asks for a higher ``max_linear_speed`` if it is below a speed that the tool needs.
 
-    With the limit, the robot would be slow, as if the board were under positional control.
+    The robot would be slow, as if the board were under positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
         assert robot.calibrate("commission", "--only", "board") == 1
@@ -126,9 +126,9 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The tool finds the signs of the axes, and notes that they describe a mirror image.
+    """If an axis is reversed, the tool finds its sign, and notes a mirror image of the robot.
 
-    After the answer "r", the motion is repeated; after an invalid answer, the question is repeated.
+    The answer "r" repeats the motion; an invalid answer repeats the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

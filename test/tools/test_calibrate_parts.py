@@ -42,7 +42,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
     """If the odometry is slow, the tool waits 3 s before it reports that the robot does not move.
 
-    The driver has no scale parameters, so the error does not mention scales.
+    Without scale parameters, the error does not mention scales.
     """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
@@ -110,7 +110,7 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
     """The tool reports a robot that moves with less than a fifth of the commanded velocity.
 
-    NaN in a measured velocity is an error, too. Very slow commands are not checked.
+    NaN is reported, too. Very slow commands are not checked.
     """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
@@ -228,7 +228,7 @@ def test_axis_signs_gyro_bias_and_linear_scale_may_be_written() -> None:
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
     """The tool rejects a file that it cannot use for the calibration or for the picture.
 
-    Examples: a file of ROS parameters, a file with an invalid value, a picture of an unknown type.
+    An example is a file of ROS parameters.
     """
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")

@@ -200,7 +200,7 @@ def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
 ) -> None:
     """If ctrl-C comes before a motion, the tool switches the motion monitor on again.
 
-    The tool has sent no command yet, so the message does not ask the user to cut the power.
+    No command was sent, so the message does not ask the user to cut the power.
     """
     set_parameters, presses = robot.set_parameters, [signal.SIGINT]
 
@@ -291,7 +291,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 ) -> None:
     """If a robot does not come to rest after Stop, the error advises to cut the robot's power.
 
-    An earlier error that has ended the motion also contains this advice.
+    An error that has ended the motion also contains this advice.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)

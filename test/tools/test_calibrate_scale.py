@@ -29,7 +29,7 @@ ASSUMED = (70.0, 70.0, 500.0)
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
     """Return the log of a drive that is planned for a board with the scales ``ASSUMED``.
 
-    ``true``: the real scales of the board. ``gyro``: factor on the yaw rate that the gyro measures.
+    ``true``: the board's real scales. ``gyro``: factor on the measured yaw rate.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -122,11 +122,7 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """The tool reports an error if it cannot find a scale.
-
-    * No speed in the log is steady.
-    * The robot moves in the opposite direction of its commands.
-    """
+    """The tool reports an error if no speed is steady, or if a speed is against its command."""
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):

@@ -26,8 +26,7 @@ def test_a_planted_motor_is_found(
 ) -> None:
     """``calibrate step`` finds the constants of the motor of wheel B within 5 %.
 
-    If a busy computer makes the steps differ, the test calibrates again, as the tool's warning
-    advises.
+    If a busy computer makes the steps differ, the test calibrates again.
     """
     monkeypatch.setattr(step, "RUN_UP_S", 1.0)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:

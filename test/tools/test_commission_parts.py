@@ -223,8 +223,8 @@ def resting(
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
     """A turn by hand is accepted only if it is to the left and large enough.
 
-    For other turns, ``require_left_turn`` raises Contradiction. The angle is measured about the
-    vertical, without the gyro's bias.
+    ``require_left_turn`` measures about the vertical, without the gyro's bias, and raises
+    Contradiction for other turns.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
@@ -311,7 +311,7 @@ def test_the_wrong_frame_turns_with_the_robot(
 ) -> None:
     """Two equal commands, before and after a turn, show whether the assumed delta frame is right.
 
-    * Right frame: the direction of the odometry in the body's axes is unchanged.
+    * Right frame: the odometry shows the same direction in the body's axes.
     * Wrong frame: the direction changes by the angle of the turn.
     * Any other change: an error.
     """
@@ -330,7 +330,7 @@ def test_the_wrong_frame_turns_with_the_robot(
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
     """A turn on the spot shows whether the driver interprets deltas correctly.
 
-    In a delta of 40 ms at 0.5 rad/s, the robot turns by 20 mrad, and each wheel by 24 counts.
+    In 40 ms at 0.5 rad/s, the robot turns by 20 mrad, and each wheel by 24 counts.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)

@@ -73,7 +73,7 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
     """Keys that the user presses while the program is suspended are discarded. Later keys steer.
 
-    The first of these keys may arrive before or after the next call of ``command``.
+    A key may arrive before or after the next call of ``command``.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)

@@ -62,7 +62,7 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
 def test_another_clock_shows_no_motion_without_or_against_a_command(ahead_s: float) -> None:
     """If the recorder's clock is 3 s off, the report names only the difference of the clocks.
 
-    The report does not say that the robot moved without a command, or against one.
+    Motion without a command, or against one, is not reported.
     """
     drive = Drive(estops=[(0.0, False), (16.5 + ahead_s, True)])
     for topic in (drive.imu, drive.odom, drive.joints, drive.cmd_vel):

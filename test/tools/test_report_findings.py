@@ -105,7 +105,7 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
     """If the messages of a topic end early, the report shows a gap up to the end of the log.
 
-    There is no gap if the driver's state, for example a pause, explains the early end.
+    There is no gap if the driver's state explains the end.
     """
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")

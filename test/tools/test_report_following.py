@@ -66,8 +66,7 @@ def test_slow_motors_that_reach_the_commanded_speed_are_good(slow_s: float) -> N
 def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
     """If the robot reaches only 80 % of the commanded yaw rate, the report gives this ratio.
 
-    The motors are slow. For two wheels, the advice is a tape measure, not another scale of the
-    odometry.
+    For two wheels, the advice is a tape measure, not another scale of the odometry.
     """
     commands = stretches(3.0)
     found = verdict(commands, behind(commands, 0.3) * [1.0, 1.0, 0.8])
@@ -82,7 +81,7 @@ def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
 def test_commands_that_always_change_give_no_advice_on_scales(wheels: tuple[str, ...]) -> None:
     """If the commands always change, the only advice is to record constant commands.
 
-    The motors are too slow, but the scales are right. The report gives the ratios in a note.
+    The report gives the ratios of the speeds in a note.
     """
     commands = wave(3.0)
     found = verdict(commands, behind(commands, 0.5), wheels)

@@ -77,10 +77,7 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """The report does not compare gyro and wheels in a gap of IMU or odometry messages.
-
-    In the rest of the log, gyro and wheels agree, so the finding is good.
-    """
+    """The report does not compare gyro and wheels in a gap of IMU or odometry messages."""
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
     assert said(drive, "IMU", "by the gyro are 1.000 times").level is Level.GOOD

@@ -112,7 +112,7 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 def test_a_board_behind_rfc2217_is_served_as_well(scheme: str) -> None:
     """A port on a server that uses RFC 2217 works like a local one.
 
-    Here, it is pyserial's example server. Upper and lower case in the URL's scheme mean the same.
+    The scheme of the URL may be in upper or lower case.
     """
     board_side = serial.serial_for_url("loop://", timeout=0.05)
     listener = socket.create_server(("127.0.0.1", 0))

@@ -41,7 +41,7 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 ) -> None:
     """For each error that prevents the opening of a port, the message has advice.
 
-    A substitute for pyserial raises the errors: the kernel, for example, refuses root no access.
+    A substitute for pyserial raises the errors, because the kernel refuses root no access.
     """
 
     def refuse(*_: object, **__: object) -> None:
@@ -113,7 +113,7 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 ) -> None:
     """A port makes a real terminal, but not a pseudo-terminal, exclusive until the port is closed.
 
-    Only root can then open the terminal again. This also keeps out programs that use no locks.
+    Only root can then open the terminal, with or without locks.
     """
 
     def exclusive() -> bool:

@@ -25,8 +25,8 @@ from omnibot_driver.transports.several import Several
 class Ends:
     """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends.
 
-    ``paths``: links to the driver's ends. The link of a lost line is removed, because another
-    program may get a terminal of the same name.
+    ``paths``: links to the driver's ends. A lost line has no link: another program may get a
+    terminal of the same name.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -132,7 +132,7 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
     """A write does not wait for a full line, and the other line gets its data at once.
 
-    Later the full line is reported as missing, and its old data is discarded.
+    Later the full line is missing, and its old data is discarded.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -173,7 +173,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 ) -> None:
     """The driver does not share a full line with the guard.
 
-    Otherwise the guard would keep the port locked, and the driver could not open it again.
+    The guard would keep the port locked, so the driver could not open it again.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])

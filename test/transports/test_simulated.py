@@ -60,7 +60,7 @@ def test_a_read_ends_without_a_packet() -> None:
 def test_a_read_that_waits_can_be_interrupted() -> None:
     """A read that waits for data returns without data if another thread interrupts it.
 
-    Otherwise, closing the transport of a paused board would often wait for the read's time limit.
+    So the close of a transport need not wait for the data of a paused board.
     """
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
@@ -151,9 +151,9 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the board's thread fails, a read and the close raise RuntimeError. The read has the cause.
+    """If the board's thread fails, a read and the close raise RuntimeError.
 
-    The error of a lost line is not raised.
+    The error of the read has the cause, and is not that of a lost line.
     """
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:

@@ -255,10 +255,7 @@ def test_a_silent_host_with_another_address_is_lost(names: Names, named: UdpPort
 def test_a_silent_host_that_may_have_the_same_address_is_not_lost(
     addresses: list[str], names: Names, named: UdpPorts
 ) -> None:
-    """A host is silent. Its name cannot be looked up, or still has the address in use as well.
-
-    The port stays open.
-    """
+    """A silent host is not lost if its name is unknown, or still has the address in use."""
     names.addresses = addresses
     names.wait_for(5, named)
 
@@ -280,7 +277,7 @@ def test_a_slow_lookup_does_not_hold_up_the_data(host: Host, names: Names, named
 def test_an_answer_is_read_although_the_name_has_another_address(
     host: Host, named: UdpPorts, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A lookup has shown another address. But the host has answered at the old one: it is read."""
+    """A lookup shows another address, but the host answers at the old one: the answer is read."""
     named.write(((0, b"hello"),))
     _, driver = host.ports[0].recvfrom(99)
     host.ports[0].sendto(b"ok", driver)

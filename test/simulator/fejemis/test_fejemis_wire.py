@@ -157,7 +157,7 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """A host can request each value of the help text, or subscribe to it, by the value's key.
+    """A host can request or subscribe to each value of the help text by the value's key.
 
     Each reply begins with the key; only the reply to ``ir`` begins with ``irc``.
     """
@@ -287,7 +287,7 @@ def test_the_two_clocks_run_apart() -> None:
 def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
     """Each Teensy sends a heartbeat every 0.4 s by its own clock, which is fast or slow.
 
-    The time in a heartbeat is a multiple of 0.4 s, or later by at most one cycle (1 ms).
+    The time in a heartbeat is late by at most one cycle (1 ms).
     """
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.1)

@@ -2,8 +2,7 @@
 
 """Detectors of quirks in motion: how a board counts ticks, and how it measures and controls speeds.
 
-A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
-the quirk after which the function is named.
+A quirk is a deviation from the manual. Each function detects the quirk after which it is named.
 """
 
 import math

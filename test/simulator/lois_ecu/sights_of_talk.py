@@ -2,8 +2,7 @@
 
 """Detectors of quirks in communication: what a board receives, sends and records.
 
-A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
-the quirk after which the function is named.
+A quirk is a deviation from the manual. Each function detects the quirk after which it is named.
 """
 
 from dataclasses import replace
@@ -160,8 +159,7 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 def terminal_passes_input_on(quirks: Quirks) -> bool:
     """Return whether the board obeys fewer than 20 of 100 lines in compass mode.
 
-    With this quirk, the board forwards each line to the compass at 4800 baud. Until this has ended,
-    it reads no other line.
+    The board reads nothing while it forwards a line to the compass at 4800 baud.
     """
     rig = Rig(quirks)
     rig.run(2.1)

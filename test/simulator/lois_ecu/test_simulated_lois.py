@@ -231,7 +231,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 def test_the_gps_moves_with_the_robot() -> None:
     """The reported longitude agrees with the robot's x axis, which points east.
 
-    The longitude is a 32-bit float and therefore rounded, so the test allows an error of 5 cm.
+    The error may be 5 cm, because the longitude is a 32-bit float.
     """
     rig = Rig(DOCUMENTED)
     rig.drive(20, 20, 20.0)
@@ -244,7 +244,7 @@ def test_the_gps_moves_with_the_robot() -> None:
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
     """A reboot makes the board silent for 2 s, and resets everything but the robot's true pose.
 
-    The tick counts are zero. The low-pass filter is not set, so the board obeys no speed command.
+    Without its low-pass filter, the board obeys no speed command.
     """
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)

@@ -120,7 +120,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """With a stuck motor, the drives RM and F fail. F gives the reason "start timedout".
+    """With a stuck right motor, the drives RM and F fail. F gives the reason "start timedout".
 
     RM gives this reason only after F has failed.
     """
@@ -340,8 +340,7 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
     """A backward drive (B) ends if the rear sonar measures less than 15 inches.
 
-    The robot moves 2 inches before the first measurement, so an obstacle at 15.5 inches ends the
-    drive.
+    The robot moves 2 inches before the first measurement.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)

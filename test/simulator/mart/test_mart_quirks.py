@@ -25,9 +25,9 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether a drive (F) counts as in progress after SL has stopped it on the stop port.
+    """Return whether a drive (F) that SL has stopped on the stop port counts as in progress.
 
-    The server then refuses other motions, and the usual stop (SM) hangs the command port.
+    The server then refuses other motions, and the stop SM hangs the command port.
     """
     rig = Rig(quirks)
     rig.drive("F")

@@ -2,8 +2,8 @@
 
 """Tests of stops on the public server: what each stop ends, and which sequences hang the server.
 
-F, B and RM are drives, R and L are spins. SM and SRM are stops on the command port, SL and SS on
-the stop port. The server never replies on the stop port.
+F, B and RM are drives, R and L spins. SM and SRM are stops on the command port, SL and SS on the
+stop port, on which the server never replies.
 """
 
 import pytest
@@ -203,8 +203,8 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
     """A stop (SL) in the first moments of a controlled move is ignored, or ends the move late.
 
-    * 0.03 s after the start: the server completes the move.
-    * 0.1 s after the start: the robot drives on, and the move ends about 0.85 s after SL.
+    * After 0.03 s: the server completes the move.
+    * After 0.1 s: the robot drives on, and the move ends about 0.85 s after SL.
     """
     rig = Rig()
     rig.say("TF 24")
@@ -291,7 +291,7 @@ def test_the_stop_port_is_never_answered() -> None:
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
     """A stop of the drive F that takes more than 0.75 s is reported as failed.
 
-    A stop of the drive RM is reported as ok, even if it takes up to 1.88 s.
+    For the drive RM, a stop may take up to 1.88 s.
     """
     rig = Rig()
     rig.ask("SLMP 1 60")

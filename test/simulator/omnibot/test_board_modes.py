@@ -200,7 +200,7 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
     """A receiver that looks for idle gaps discards an incomplete frame after a gap.
 
-    The board computes the gap from the arrival times, or from ticks if the caller gives no times.
+    The gap comes from the arrival times of the bytes or, without these, from the ticks.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

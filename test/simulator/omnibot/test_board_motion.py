@@ -140,7 +140,7 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 ) -> None:
     """With the switch on "position", a command is a pose in the earth frame, in mm and mrad.
 
-    For a heading of more than a full turn, the robot turns by the whole angle.
+    If the heading is more than a full turn, the robot turns by the whole angle.
     """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))

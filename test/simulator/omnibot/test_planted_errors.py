@@ -110,7 +110,7 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 ) -> None:
     """The IMU of a tilted robot measures gravity in the axes of the IMU's mounting.
 
-    REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
+    REP-103: a raised front is a negative pitch, a raised left side is a positive roll.
     """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)

@@ -247,7 +247,7 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """Some receivers count bytes from the boot among the three bytes that wake the board."""
+    """Some receivers count bytes from the time of the boot among the three that wake the board."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()

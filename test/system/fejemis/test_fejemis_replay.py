@@ -24,8 +24,7 @@ RAW: Final = [
 RECOGNISED: Final = 100
 """Number of packets that a recording needs from each Teensy, so that a replay recognises it.
 
-The Teensy's answers to the driver's first questions may be missing. A Teensy sends these packets in
-1 s or more.
+The answers to the driver's first questions are not needed.
 """
 
 

@@ -51,8 +51,8 @@ def test_it_drives_and_odometry_tells_how_far_even_across_a_restart_of_the_board
 ) -> None:
     """Odometry is right within 3 cm after a drive, and continues across a restart of the board.
 
-    After the restart, the driver writes its controller gains and the period of the ticks again. The
-    final error is at most 8 cm, or 3 sigma if this is more.
+    After the restart, the driver writes gains and periods again. The final error is at most 8 cm,
+    or 3 sigma if this is more.
     """
     ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", ticks_period=0.2, **GAINS))
@@ -126,7 +126,10 @@ def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> 
 def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """The board's button stops the robot and latches the e-stop; only ``~/estop`` releases it."""
+    """The board's button stops the robot and latches the e-stop.
+
+    Only the service ``~/estop`` releases the e-stop.
+    """
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
     with driven(probe, ecu):
@@ -145,7 +148,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """``~/reset`` sets the board's tick counts to 0, but the pose in odom continues.
 
-    When the wheels start, a report may correct the pose by 0.15 m: the board reports every 400 ms.
+    When the wheels start, a report may correct the pose by 0.15 m.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)

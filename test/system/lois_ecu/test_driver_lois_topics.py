@@ -31,7 +31,7 @@ NODE: Final = "omnibot_driver"
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
     """The services switch the LED, and send the ball command exactly once.
 
-    The board may miss the command while it sends, but a repetition could drop a second ball.
+    The board may miss the command, but a repetition could drop a second ball.
     """
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
@@ -49,7 +49,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 ) -> None:
     """If the compass shows east and the declination is 0.1 rad, the published heading is -0.1 rad.
 
-    In the ENU frame, east is 0 and left is positive. GPS position and time are published, too.
+    In the ENU frame, east is 0 and left is positive.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
@@ -179,7 +179,7 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
 ) -> None:
     """The calibration tool records the ticks of both wheels during a drive, and stops the robot.
 
-    While the e-stop is latched, a record fails, and the tool reports the reason.
+    With a latched e-stop, the tool reports why a record fails.
     """
     leave_events_out(monkeypatch)
     monkeypatch.setattr(listener, "LOST_S", 3.0)  # for a busy computer

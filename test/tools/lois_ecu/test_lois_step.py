@@ -147,7 +147,7 @@ def test_records_that_are_too_short_are_refused() -> None:
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
     """If short and long ticks alternate, the tool finds a correction factor for each kind.
 
-    The first tick may be short or long, and the board may miss some edges.
+    The board has missed some edges.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -179,8 +179,7 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
     """If the board sends data during a step, the overshoot becomes only a little larger.
 
-    * No data: the tuned gains have an overshoot of at most 5 %.
-    * With data: 95 % of the overshoots are below 8 %.
+    95 % of the overshoots are below 8 %; without data, the limit is 5 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
@@ -294,7 +293,7 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
     """The tool refuses a record in which every time is the largest number that the record can hold.
 
-    In the manual's unit, 100 ns, this number means 6.6 ms; the true times may be longer.
+    The true times may be longer: in the manual's unit of 100 ns, the number means 6.6 ms.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"

@@ -28,8 +28,8 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """``calibrate step`` finds the constants of both wheels, and sets corrections and gains.
 
-    The robot has marks that are 10 % off, unequal wheels, dead time and backlash. The calibration
-    file may have all values found. The board keeps its own period.
+    The robot has marks that are 10 % off, unequal wheels, dead time and backlash. The board's own
+    period is kept.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
@@ -66,7 +66,7 @@ def test_a_limit_that_reduces_the_full_duty_is_named(
 ) -> None:
     """The tool ends with an error if a parameter of the driver reduces the full duty.
 
-    Otherwise, the measured gain and dead zone would be wrong. The error names the parameter.
+    Otherwise, the measured gain and dead zone would be wrong.
     """
     robot = SimulatedRobot(tmp_path, random_motors(5))
     robot.set_parameters({limit: value})
