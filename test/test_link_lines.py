@@ -173,10 +173,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 def test_an_overrun_is_counted_once_although_another_line_is_lost_and_comes_back(
     lines: Lines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When a lost line is opened again, the total number of overruns of all lines is unchanged.
-
-    The kernel counts the new connection from 0.
-    """
+    """When a lost line is opened again, the total number of overruns of all lines is unchanged."""
     overruns = {lines.drive.path: 5, str(lines.name): 3}
     monkeypatch.setattr(SerialPort, "overruns", property(lambda port: overruns[port._url]))
     monkeypatch.setattr("omnibot_driver.reader.COUNT_EVERY_S", 0.0)

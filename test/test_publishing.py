@@ -182,10 +182,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 
 
 def test_the_result_of_a_request_does_not_wait_for_simulated_time(node: Node) -> None:
-    """The driver passes on the result of a request before the simulated clock has begun.
-
-    Measurements wait for the clock, because they need a stamp.
-    """
+    """The driver passes on the result of a request before the simulated clock has begun."""
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)
     published: list[Charge] = []

@@ -79,7 +79,7 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Commands that are refused because of a stall also show that their sender is not silent.
+    """A sender whose commands are refused because of a stall is not silent.
 
     So the driver also refuses the sender's next command after the stall.
     """

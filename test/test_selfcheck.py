@@ -104,10 +104,7 @@ def test_a_prefix_without_its_slash_is_told_of_with_the_remedy(prefix: str) -> N
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """With simulated time, the driver warns if /clock is not published, except in a replay.
-
-    A recording has its own stamps, so its measurements do not wait for /clock.
-    """
+    """With simulated time, the driver warns if /clock is not published, except in a replay."""
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
 

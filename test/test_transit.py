@@ -114,10 +114,7 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """A command that waited too long in the driver's own queue is refused, even a first one.
-
-    The driver measures this wait by its own clock.
-    """
+    """A command that waited too long in the driver's own queue is refused, even a first one."""
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
     assert delay.total_s == pytest.approx(waited_s)
@@ -268,10 +265,7 @@ def test_clocks_that_drift_are_followed(drift: float) -> None:
 
 
 def test_an_old_command_is_refused_after_a_night_without_commands() -> None:
-    """A command that was sent 5 s ago is refused, even after eight hours without a command.
-
-    The clocks drift apart by less than 5 s in this time.
-    """
+    """A command that was sent 5 s ago is refused, even after eight hours without a command."""
     receiver, sender = Receiver(), Sender()
     for number in range(20):
         receiver.hear(sender, 100.0 + 0.1 * number, 0.01)

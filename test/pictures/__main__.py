@@ -2,7 +2,7 @@
 
 """Make the pictures of the README and the documents, except those that no program can make.
 
-``make pictures`` runs this program. It runs ``main(folder)`` of two modules at a time.
+``make pictures`` runs this program, which runs ``main(folder)`` of two modules at a time.
 """
 
 import os

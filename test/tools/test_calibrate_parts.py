@@ -40,10 +40,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """If the odometry is slow, the tool waits 3 s before it reports that the robot does not move.
-
-    Without scale parameters, the error does not mention scales.
-    """
+    """If the odometry is slow, the tool waits 3 s before it reports a robot that does not move."""
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
     for tick in range(250):
@@ -226,10 +223,7 @@ def test_axis_signs_gyro_bias_and_linear_scale_may_be_written() -> None:
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
-    """The tool rejects a file that it cannot use for the calibration or for the picture.
-
-    An example is a file of ROS parameters.
-    """
+    """The tool rejects a file that it cannot use for the calibration or for the picture."""
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
     with pytest.raises(ToolError, match="is a file of ROS parameters"):

@@ -223,10 +223,7 @@ def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
 def test_a_motion_is_not_evaluated_if_the_clocks_differ(
     robot: Robot, rigged: Rig, behind_s: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A motion is not evaluated if the robot's clock differs from this computer's clock.
-
-    The tool would compare a command with the motion at another time.
-    """
+    """A motion is not evaluated if the robot's clock differs from this computer's clock."""
     seconds = listener._seconds
     monkeypatch.setattr(listener, "_seconds", lambda message: seconds(message) - behind_s)
     sign = "-" if behind_s < 0 else ""

@@ -24,10 +24,7 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``calibrate step`` finds the constants of the motor of wheel B within 5 %.
-
-    If a busy computer makes the steps differ, the test calibrates again.
-    """
+    """``calibrate step`` finds the constants of the motor of wheel B within 5 %."""
     monkeypatch.setattr(step, "RUN_UP_S", 1.0)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
         for _ in range(ATTEMPTS):

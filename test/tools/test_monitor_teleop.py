@@ -71,10 +71,7 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 
 @pytest.mark.parametrize("key_first", [True, False])
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
-    """Keys that the user presses while the program is suspended are discarded. Later keys steer.
-
-    A key may arrive before or after the next call of ``command``.
-    """
+    """Keys that the user presses while the program is suspended are discarded. Later keys steer."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.0) not in (None, HALT)

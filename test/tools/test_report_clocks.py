@@ -14,10 +14,7 @@ from omnibot_driver.tools.report.judge import judge
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """Timestamps that jump ahead and slowly become right are reported as a jump, not as a gap.
-
-    The cause is a driver that could not read for some time.
-    """
+    """Timestamps that jump ahead and slowly become right are reported as a jump, not as a gap."""
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
     (leap,) = troubles(drive)

@@ -275,7 +275,7 @@ def test_the_imu_of_another_robot_is_not_expected(
 ) -> None:
     """The finding about missing IMU messages depends on which of two robots have an IMU.
 
-    * Both, or this robot by its topics: BAD.
+    * Both robots, or the topics show an IMU: BAD.
     * One of the two: NOTE.
     * None: no finding.
     """

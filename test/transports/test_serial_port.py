@@ -39,10 +39,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_every_way_a_port_can_refuse_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
 ) -> None:
-    """For each error that prevents the opening of a port, the message has advice.
-
-    A substitute for pyserial raises the errors, because the kernel refuses root no access.
-    """
+    """For each error that prevents the opening of a port, the message has advice."""
 
     def refuse(*_: object, **__: object) -> None:
         raise error
@@ -155,10 +152,7 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 def test_a_write_that_is_taken_in_pieces_is_completed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The port completes a long write that the kernel accepts only in parts.
-
-    The test sets a long timeout, because the other end reads slowly on a busy computer.
-    """
+    """The port completes a long write that the kernel accepts only in parts."""
     monkeypatch.setattr("omnibot_driver.transports.serial_port.WRITE_TIMEOUT_S", PATIENCE_S)
     port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))

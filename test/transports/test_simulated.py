@@ -58,10 +58,7 @@ def test_a_read_ends_without_a_packet() -> None:
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """A read that waits for data returns without data if another thread interrupts it.
-
-    So the close of a transport need not wait for the data of a paused board.
-    """
+    """A read that waits for data returns without data if another thread interrupts it."""
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
     canceller.start()

@@ -141,10 +141,7 @@ def test_waiting_for_what_does_not_come_ends_with_false() -> None:
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """After a board's thread has failed, waiting for the board and closing it raise RuntimeError.
-
-    The cause of each RuntimeError is the exception of the thread.
-    """
+    """If a board's thread has failed, waiting for the board and closing it raise RuntimeError."""
 
     class BrokenBoard(Ticker):
         def advance(self) -> list[Packet]:

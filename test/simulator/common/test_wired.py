@@ -51,10 +51,7 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """The delay of a datagram is measured in the board's simulated time, not in real time.
-
-    Some datagrams are lost, and some arrive twice.
-    """
+    """The delay of a datagram is measured in the board's simulated time, not in real time."""
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
     wired = WiredBoard(board, [network])

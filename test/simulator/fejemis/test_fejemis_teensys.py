@@ -235,10 +235,7 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """A frozen angle sensor repeats its angle; the angle line shows an absent or faulty sensor.
-
-    With a frozen sensor, the steering runs to its end stop.
-    """
+    """A frozen angle sensor repeats its angle; the angle line shows an absent or faulty sensor."""
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")
     rig.run(1.0)

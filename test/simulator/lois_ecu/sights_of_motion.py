@@ -43,10 +43,7 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 
 
 def velocity_may_be_nan(quirks: Quirks) -> bool:
-    """Return whether some velocities that are reported in a straight drive are not finite.
-
-    If ticks of both wheels coincide, the board can divide by zero.
-    """
+    """Return whether some velocities that are reported in a straight drive are not finite."""
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60), SetDuty(60, 60))
     rig.run(3.0)

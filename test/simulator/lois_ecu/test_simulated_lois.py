@@ -229,10 +229,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 
 @pytest.mark.slow
 def test_the_gps_moves_with_the_robot() -> None:
-    """The reported longitude agrees with the robot's x axis, which points east.
-
-    The error may be 5 cm, because the longitude is a 32-bit float.
-    """
+    """The reported longitude agrees with the robot's x axis, which points east."""
     rig = Rig(DOCUMENTED)
     rig.drive(20, 20, 20.0)
     fixes = [report for report in rig.drive(0, 0, 3.0) if isinstance(report, GpsPosition)]

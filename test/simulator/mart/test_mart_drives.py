@@ -23,10 +23,7 @@ def test_rm_answers_in_71_ms() -> None:
 
 
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
-    """The reply to the drive F comes after 220 ms, and the reply to the turn R after 61 ms.
-
-    For F, the server first measures the bias of the gyro.
-    """
+    """The reply to the drive F comes after 220 ms, and the reply to the turn R after 61 ms."""
     rig = Rig()
     assert rig.ask("F") == "ok"
     assert rig.took_s == pytest.approx(0.22, abs=0.015)

@@ -53,10 +53,7 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """After SS on the stop port has stopped a spin, the reply to SM has the angle of the spin.
-
-    The server then accepts the next motion.
-    """
+    """After SS on the stop port has stopped a spin, SM works and reports the angle of the spin."""
     rig = Rig()
     rig.drive("R")
     rig.stop("SS")
@@ -107,10 +104,7 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """After SL or SS on the stop port has ended a drive, SM or SRM hangs the command port for ever.
-
-    The motors are off.
-    """
+    """After SL or SS on the stop port has ended a drive, SM or SRM hangs the command port."""
     rig = Rig()
     rig.drive(start)
     rig.stop(stop)

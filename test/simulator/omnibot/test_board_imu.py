@@ -69,10 +69,7 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """The upside-down sensor measures an acceleration to the left as negative y.
-
-    The measured accelerations, added up over time, give the speed of the robot.
-    """
+    """The upside-down sensor measures an acceleration to the left as negative y."""
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
     values = readings(board, 1.0)

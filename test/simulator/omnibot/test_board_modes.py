@@ -142,10 +142,7 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """The first three bytes of a frame wake a sleeping board; the next bytes act as letters.
-
-    Here, the letter R (0x52) resets the board.
-    """
+    """The first three bytes of a frame wake a sleeping board; the next bytes act as letters."""
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
     assert [command.kind for command in board.commands] == ["reset"]

@@ -183,10 +183,7 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A window receiver obeys a stop frame that lacks a byte, and also the complete frame after it.
-
-    The first FF of the second frame counts for both frames.
-    """
+    """A window receiver obeys a stop frame that lacks a byte, and the complete frame after it."""
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
         STOP,

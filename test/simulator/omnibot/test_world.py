@@ -72,10 +72,7 @@ def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """With a slip of 10 % on average, the robot turns by 90 % of the angle that the encoders show.
-
-    The slip is random and depends on the seed.
-    """
+    """With 10 % slip on average, the robot turns by 90 % of the angle that the encoders show."""
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
     second = drive(BoardSettings(slip=0.1, seed=2), 3000)

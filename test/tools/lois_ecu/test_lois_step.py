@@ -96,10 +96,7 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """The fit finds misplaced marks, which change the times between ticks by 10 %.
-
-    The remaining error of less than 1 % comes from the rounding of the board's clock.
-    """
+    """The fit finds misplaced marks, which change the times between ticks by 10 %."""
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
     assert np.std(found.marks.steps) == pytest.approx(0.1, abs=0.02)
