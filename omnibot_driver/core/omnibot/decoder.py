@@ -28,7 +28,7 @@ from omnibot_driver.core.omnibot.frames import (
     decode_measured,
     measure,
 )
-from omnibot_driver.core.omnibot.gaps import BYTE_S, LATE_S, TICK_BYTES, InterFrameGaps
+from omnibot_driver.core.omnibot.gaps import BYTE_S, NORMAL_PAUSE_S, TICK_BYTES, InterFrameGaps
 from omnibot_driver.core.omnibot.late_reads import IDLE_S
 from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
@@ -162,7 +162,7 @@ class FrameDecoder:
 
         Return whether ``data`` is accepted.
         """
-        if pause_s > LATE_S or len(data) > TICK_BYTES:
+        if pause_s > NORMAL_PAUSE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
         end, context = take_run(data, 0, self.context, self.expectation, order, walk)

@@ -32,7 +32,7 @@ from omnibot_driver.core.omnibot.late_reads import (
     cause,
 )
 
-LATE_S: Final = 0.011
+NORMAL_PAUSE_S: Final = 0.011
 """Longest normal pause in s between two reads: about one tick.
 
 A longer pause shows lost bytes, an adapter that collects bytes, or a late read.
@@ -83,7 +83,7 @@ class InterFrameGaps:
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
-        self.collected = pause_s > LATE_S and arrived <= 2 * TICK_BYTES
+        self.collected = pause_s > NORMAL_PAUSE_S and arrived <= 2 * TICK_BYTES
         if idle_s > GAP_S and arrived <= TICK_BYTES:
             self._add(pause_s, arrived, place)
         if self.gaps:
@@ -92,7 +92,7 @@ class InterFrameGaps:
     def _add(self, pause_s: float, arrived: int, place: int) -> None:
         silent = pause_s >= IDLE_S
         sharp, between = self.sharp, self.between
-        if pause_s > LATE_S:
+        if pause_s > NORMAL_PAUSE_S:
             # Such a long pause shows lost bytes. It is unlikely that only whole frames were lost.
             sharp = sharp or between or silent
             self._trust(sharp=False, between=False)
@@ -154,10 +154,10 @@ class InterFrameGaps:
         """Return whether the bytes from ``start`` on came quickly, and after a short pause.
 
         All of these bytes must have come within half a tick, directly after a pause of at most
-        ``LATE_S``.
+        ``NORMAL_PAUSE_S``.
         """
         for gap in self.gaps:
-            if gap.first == start and gap.pause_s <= LATE_S:
+            if gap.first == start and gap.pause_s <= NORMAL_PAUSE_S:
                 came = next(read.now for read in self._reads if read.end > start)
                 return self._reads[-1].now - came < HALF_TICK_S
         return False

@@ -14,7 +14,7 @@ from omnibot_driver.core.omnibot.cost_model import Context
 from omnibot_driver.core.omnibot.decoder import FrameDecoder
 from omnibot_driver.core.omnibot.fast_path import UnfrozenImu
 from omnibot_driver.core.omnibot.frames import IMU_HEADER, IMU_LENGTH, LENT, ImuFrame
-from omnibot_driver.core.omnibot.gaps import LATE_S
+from omnibot_driver.core.omnibot.gaps import NORMAL_PAUSE_S
 from omnibot_driver.core.omnibot.late_reads import GAP_S
 from omnibot_driver.core.omnibot.translation import Translation
 from omnibot_driver.core.readings import ImuReading
@@ -44,7 +44,7 @@ def is_begun(
         prompt = (
             translation.singles_to_come > 0
             and decoder.at_rest
-            and now - decoder.last_arrival_s <= LATE_S
+            and now - decoder.last_arrival_s <= NORMAL_PAUSE_S
         )
     return prompt and 0 < len(data) < IMU_LENGTH and IMU_HEADER.startswith(data[:2])
 
@@ -102,7 +102,7 @@ def take_single(
         not translation.singles_to_come
         or not decoder.at_rest
         or len(data) != IMU_LENGTH
-        or pause_s > LATE_S
+        or pause_s > NORMAL_PAUSE_S
     ):
         return None
     x: int  # types for compiled code, as in ``fast_path``
