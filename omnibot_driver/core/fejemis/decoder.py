@@ -33,7 +33,6 @@ class DecoderStatistics:
     lines: int = 0
     faults: int = 0
     discarded_bytes: int = 0
-    comments: int = 0
 
 
 class FejemisDecoder:
@@ -111,9 +110,7 @@ class FejemisDecoder:
             return None
         else:
             self.doubtful = self.contradicted = False
-        if isinstance(message, Comment):
-            self.statistics.comments += 1
-        elif not self._forms.admit(text, summed=right is True):
+        if not isinstance(message, Comment) and not self._forms.admit(text, summed=right is True):
             return None
         self.statistics.lines += 1
         return message
