@@ -99,7 +99,7 @@ class Inbound:
         if now >= self._reporter.news_at:
             self._reporter.look_for_news(now)
         if self._board.mode.running and not isinstance(last, PausedReading):
-            self._mode_manager.heard_data(now)
+            self._mode_manager.heard_data(now, estopped=self._commanding.policy.latched)
         return True
 
     def elapse(self, now: float) -> None:

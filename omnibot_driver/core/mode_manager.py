@@ -43,6 +43,9 @@ A paused board sends a «Paused» text every second. In two cases, the text prov
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
+HELD: Final = (
+    ", but the e-stop is latched: the robot does not move until you release it with ~/estop"
+)
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
 
@@ -233,18 +236,22 @@ class ModeManager:
         """
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
-    def heard_data(self, now: float) -> None:
-        """Record that the board sends data and runs."""
+    def heard_data(self, now: float, *, estopped: bool) -> None:
+        """Record that the board sends data and runs.
+
+        ``estopped``: whether the driver's e-stop is latched. The answer to a request says so.
+        """
         data_at, self._data_at = self._data_at, now
         if self.at_rest:
             return
         self._flowed_s += min(now - data_at, FLOWING_S)
         self._shown_at = math.inf
         unheard = self._flowed_s >= PAUSE_RETRY_S
+        running = f"running ({self._board.mode.value})" + (HELD if estopped else "")
         if self.phase is Phase.STARTING:
-            self._settle(f"running ({self._board.mode.value})")
+            self._settle(running)
         elif self.phase is Phase.SETTLED and self._request is Request.START:
-            self._answer(True, f"running ({self._board.mode.value})")
+            self._answer(True, running)
         elif self.phase is Phase.SETTLED and self._wanted is Wanted.PAUSED:
             self._begin_pausing(now, with_p=True)
         elif self.phase is Phase.PAUSING and (unheard or not self._paused_with_p):

@@ -12,9 +12,12 @@ from any_board import BOARDS, MAKERS, TICK_S, AnyBench, nominal
 from omnibot_driver.boards import PROFILES
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.requests import Request, RequestDone
 
 ENDS_S = 1.0
 """Longest time that a robot needs to come to rest after it has received a stop, in s."""
+STARTED = [name for name in BOARDS if Request.START in MAKERS[name]()[0].traits.requests]
+"""Names of the boards that have ~/start."""
 
 
 @pytest.fixture(params=BOARDS)
@@ -136,6 +139,25 @@ def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
 def reconnect(bench: AnyBench) -> None:
     bench.close()
     bench.open()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STARTED)
+def test_the_answer_to_a_start_says_that_the_estop_is_latched(name: str) -> None:
+    """The user calls ~/start on a running board while the e-stop is latched.
+
+    The start succeeds, because the board runs. Its answer says that the robot does not move until
+    the e-stop is released. After the release, the answer no longer says so.
+    """
+    bench = nominal(name)
+    for latched in (True, False):
+        bench.estop(latched)
+        bench.session.request(Request.START, token := object(), bench.now)
+        bench.run(1.0)
+        (answer,) = (e for e in bench.events if isinstance(e, RequestDone) and e.token is token)
+        assert answer.success
+        assert answer.message.startswith("running (nominal)")
+        assert ("the e-stop is latched" in answer.message) == latched
 
 
 EVENTS: dict[str, Callable[[AnyBench], object]] = {
