@@ -9,7 +9,6 @@ clearly contradict the pose, the pose alone decides.
 """
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
@@ -55,21 +54,6 @@ MOVED_FRAME: Final = 2
 poses."""
 
 
-@dataclass(slots=True)
-class _Jump:
-    """Rejected poses that may begin a new coordinate frame, although the robot has not jumped.
-
-    Wheel speeds are known for the whole time since the last accepted pose. They contradict the
-    first rejected pose, and they explain the motion from each rejected pose to the next.
-
-    ``first``: the first rejected pose. ``rolled``: the motion from the last accepted pose to it,
-    computed from the wheel speeds.
-    """
-
-    first: BoardPose
-    rolled: Pose
-
-
 class PoseOdometry:
     """Turns poses and wheel speeds into displacements.
 
@@ -98,7 +82,12 @@ class PoseOdometry:
         self._agreed = 0
         """How often in a row a rejected pose has agreed with the pose before it, which was
         rejected, too."""
-        self._jump: _Jump | None = None
+        self._jump: Pose | None = None
+        """Motion from the last accepted pose to the last rejected one, computed from wheel speeds.
+
+        It is not None if the rejected poses may be in a new coordinate frame: the wheel speeds are
+        known for this whole time, and they contradict the first rejected pose.
+        """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_s = self._time_s = -math.inf
@@ -190,10 +179,15 @@ class PoseOdometry:
         whole = log_of(self._told.way_to(_place(pose)))
         self._agreed += 1
         rolled = self._rolled(seconds)
-        if self._jump is not None and rolled is not None and self._near(way - rolled, seconds):
+        if self._jump is not None and rolled is not None:
             # The board computes poses and wheel speeds from the same encoders. So the poses have a
             # new origin, even if the robot could have driven to this place.
-            return self._in_moved_frame(pose, self._jump, since_s)
+            self._jump = self._jump.moved(roll(rolled))
+            if self._near(way - rolled, seconds):
+                return self._in_moved_frame(pose, self._jump, since_s)
+            if since_s <= FRESH_S:  # the origin may have moved again
+                self._agreed = 0
+                return None
         self._jump = None
         if since_s > 0.0 and _possible(whole, since_s):
             self._begin_at(pose)
@@ -205,8 +199,8 @@ class PoseOdometry:
             way.x_m, way.y_m, way.yaw_rad, "body", seconds, 0, restarted=True
         )
 
-    def _jump_at(self, pose: BoardPose, since_s: float) -> _Jump | None:
-        """Return the jump that begins with this rejected pose; None if it may not be one.
+    def _jump_at(self, pose: BoardPose, since_s: float) -> Pose | None:
+        """Return the motion, by the wheels, to this rejected pose; None if it may not be a jump.
 
         ``since_s``: time in s since the last accepted pose.
         """
@@ -215,17 +209,16 @@ class PoseOdometry:
         if digit_m > SLACK_M or since_s < LEAST_S:  # rounding alone can contradict the wheels
             return None
         rolled = self._rolled(since_s)
-        return None if rolled is None else _Jump(pose, rolled)
+        return None if rolled is None else roll(rolled)
 
     def _in_moved_frame(
-        self, pose: BoardPose, jump: _Jump, since_s: float
+        self, pose: BoardPose, jump: Pose, since_s: float
     ) -> DisplacementReading | None:
         if self._agreed < MOVED_FRAME:
             return None
-        way = roll(jump.rolled).moved(_place(jump.first).way_to(_place(pose)))
         self._begin_at(pose)
         self._moved = True
-        return _reading(log_of(way), since_s)
+        return _reading(log_of(jump), since_s)
 
     def _rolled(self, seconds: float) -> Pose | None:
         """Return the motion in ``seconds``, computed from the last two pairs of wheel speeds.

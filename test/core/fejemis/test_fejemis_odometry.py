@@ -132,6 +132,24 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
     assert drive.odometry.refused == 1
 
 
+def test_two_different_false_poses_in_a_row_move_nothing() -> None:
+    """Two successive poses are false, each in another way, and the robot could have driven to both.
+
+    The wheel speeds contradict the motion to the first one, and the motion between them.
+    """
+    drive = Drive()
+    drive.run(0.0, 0.0, 0.1)
+    drive.run(0.3, 0.4, 2.0)
+    for off_x_m, off_y_m in ((0.1, 0.0), (0.15, 0.05)):
+        drive.step(0.3, 0.4, heard=False)
+        p = told(drive.board, drive.now)
+        assert (
+            drive.say(BoardPose(p.time_s, p.x_m + off_x_m, p.y_m + off_y_m, p.yaw_rad, 3)) is None
+        )
+    drive.run(0.3, 0.4, 1.0)
+    assert drive.out.way_to(drive.board).way_m < 0.003
+
+
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
     """The odometry does not jump when another program sets the board's pose to zero (``enc0``)."""
     drive = Drive()
@@ -165,6 +183,26 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
     off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
     assert off.way_m < 0.02
     assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
+
+
+@pytest.mark.parametrize("wait_s", [0.01, 0.03, 0.04, 0.05])
+@pytest.mark.parametrize("v", [0.5, 0.9])
+def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
+    v: float, wait_s: float
+) -> None:
+    """Another program sends ``enc0`` twice during a drive, the second within three poses.
+
+    Regression: the second one seemed to contradict the first, and ``odom`` went back by the whole
+    way driven.
+    """
+    bench = nominal()
+    bench.drive_on(v, 0.0, 0.8)
+    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+    bench.run(wait_s)
+    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+    bench.drive_on(v, 0.0, 0.5)
+    bench.run(1.5)
+    assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.truth.x_m, abs=0.01)
 
 
 @pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
