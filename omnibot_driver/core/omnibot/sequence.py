@@ -90,7 +90,10 @@ class Sequence:
         as well as a loss of all deltas in this gap."""
         self._may_be_new = False
         """Whether a gap has ended since the last pose, and the counter of the delta after it
-        also fits a counter that began at zero in this gap."""
+        also fits a counter that began at zero in this gap.
+
+        A pause or a reconnection does not change this: the next pose is still the first one after
+        the gap."""
         self._left: tuple[int, float, int] | None = None
         """What is needed to withdraw a supposed restart: the last counter before it, the arrival
         time of this counter in s, and the first counter after the restart."""

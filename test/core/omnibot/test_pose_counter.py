@@ -2,6 +2,8 @@
 
 """Tests of what the counter of the poses shows: lost deltas and restarts."""
 
+from collections.abc import Callable
+
 import pytest
 
 from omnibot_driver.core.omnibot.sequence import Sequence, Step
@@ -78,6 +80,26 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
     assert ambiguous != (pose.restarted or any(step.restarted for step in steps))
     sequence.pose(1, begun_s + 9 * 0.04)
     assert not sequence.ambiguous
+
+
+@pytest.mark.parametrize("interrupt", [Sequence.pause, Sequence.reconnect])
+def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
+    interrupt: Callable[[Sequence], None],
+) -> None:
+    """After a gap of 2.1 s, both counters fit a restart as well as a loss of all deltas.
+
+    Before the first pose, the board is paused, or the port is opened again. The pose is ambiguous
+    as before, because it is the first one after the gap. Otherwise, ``odom`` would move to the old
+    origin if the board has restarted.
+    """
+    sequence = counted(1228)
+    begun_s = 1228 * 0.04 + 2.1
+    for count in range(5):
+        if count == 3:
+            interrupt(sequence)
+        sequence.delta(count, begun_s + count * 0.04)
+    sequence.pose(0, begun_s + 4 * 0.04)
+    assert sequence.ambiguous
 
 
 @pytest.mark.parametrize(("number", "restarted"), [(2, True), (51, False), (30, False)])
