@@ -81,8 +81,9 @@ class StreamStatistics:
                 self._force, self._rate = force, rate
             elif isinstance(reading, DisplacementReading):
                 self.displacements += 1
-                self._miss(reading.lost, reading.restarted)
-                self._restarted |= reading.restarted
+                restarted = reading.restarted and not reading.doubtful
+                self._miss(reading.lost, restarted)
+                self._restarted |= restarted
                 self._miss_imus(reading)
             elif isinstance(reading, PoseReading):
                 self.poses += 1

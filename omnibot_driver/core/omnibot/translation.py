@@ -176,7 +176,7 @@ class Translation:
                 return pose
             case PausedFrame(count):
                 self._paused_count = count
-                self._sequence.pause()
+                self._sequence.pause(now)
                 self._rhythm = FrameSchedule(self._schedule)
                 if paused_count is None:
                     return PausedReading()
@@ -197,6 +197,7 @@ class Translation:
             duration_s=step.duration_s,
             lost=step.lost,
             restarted=step.restarted,
+            doubtful=step.doubtful,
         )
         self.suspicion.displaced(displacement)
         self.suspicion.spaced(displacement, imus, now)

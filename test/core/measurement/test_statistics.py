@@ -3,7 +3,7 @@
 """Tests of the counts of lost readings, with a simulated OmniBot."""
 
 import pytest
-from session_bench import Bench
+from session_bench import TICK_S, Bench
 
 from omnibot_driver.simulator.omnibot import BoardSettings
 
@@ -41,6 +41,33 @@ def test_a_pause_loses_nothing() -> None:
     bench.run_until_state("nominal")
     bench.run(2.0)
     assert lost(bench) == (0, 0)
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+def test_a_restart_after_a_pause_counts_only_if_lost_deltas_do_not_explain_it(
+    restarts: bool,
+) -> None:
+    """The board is paused and started again, or it restarts. The first delta after it is lost.
+
+    The count of the next delta shows only the restart for sure. A restart shows a warning.
+    """
+    bench = Bench(BoardSettings(running=True))
+    bench.open()
+    bench.run(3.0)
+    if restarts:
+        bench.board.reboot()
+    else:
+        bench.board.receive(b"P")
+    bench.run_until_state("paused")
+    displacements = bench.session.figures(bench.now).tally.displacements
+    while b"\xff\xfb" not in bench.board.step():
+        bench.now += TICK_S
+        bench.session.tick(bench.now)
+        bench.settle()
+    bench.run(2.0)
+    tally = bench.session.figures(bench.now).tally
+    assert tally.displacements > displacements
+    assert tally.restarts == restarts
 
 
 def test_a_restart_that_a_delta_and_a_pose_show_counts_once() -> None:
