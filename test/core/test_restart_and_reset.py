@@ -236,6 +236,8 @@ def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
     """If the odometry is reset near the end of a gap, odom does not contain the lost motion.
 
     After a reset near the beginning, odom contains it. The gap lasts 3 s.
+    The displacement after the gap has an estimate in both cases. Without the motion, it is zero,
+    and its twist is unknown.
     """
     for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
         odometry, trip = Odometry(SETTINGS), Trip()
@@ -249,8 +251,12 @@ def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
             reading = replace(reading, dx_m=0.75, duration_s=None)
         else:
             reading = replace(reading, lost=74)
-        odometry.displace(reading, 4.0)
+        estimates = odometry.displace(reading, 4.0)
         for _ in range(2):
-            odometry.settle(trip.pose)
+            estimates += odometry.settle(trip.pose)
+        assert [estimate.stamp_s for estimate in estimates] == [4.0]
+        if not way_m:
+            expected = OdometryEstimate(4.0, Pose(), None, Covariance(), estimates[0].rolled)
+            assert estimates == [expected]
         estimates = odometry.displace(trip.move(0.0, 0.0, 0.0), 10.0)
         assert last(estimates) == close((way_m, 0.0, 0.0), 1e-6)

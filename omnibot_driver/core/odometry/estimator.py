@@ -13,7 +13,7 @@ from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose, Signs, log_of, roll
 from omnibot_driver.core.odometry.board_frame import is_begun
-from omnibot_driver.core.odometry.covariance import NOTHING
+from omnibot_driver.core.odometry.covariance import NOTHING, Covariance
 from omnibot_driver.core.odometry.dead_reckoning import DeadReckoning
 from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.odometry.pending_displacements import (
@@ -102,7 +102,8 @@ class Odometry:
 
         Return the estimates of displacements that were still waiting for a pose. Displacements that
         waited for the board's first pose are discarded. If the next displacement ends a gap, and
-        most of this gap is older than the reset, its motion is discarded too.
+        most of this gap is older than the reset, its motion is discarded too. Its estimate is then
+        at the origin, with an unknown twist.
 
         If motion was lost before the reset, the board's heading is uncertain. So the board's next
         poses show it again, as they showed the initial heading.
@@ -128,9 +129,11 @@ class Odometry:
         if reset_s is not None:
             gap_s = self._gap_s(reading, stamp_s)
             if gap_s and stamp_s - reset_s < gap_s / 2:
-                self.displace(reading, stamp_s)
-                self.reset(stamp_s)
-                return []
+                due = self.displace(reading, stamp_s) + self.reset(stamp_s)
+                return [
+                    replace(it, pose=Pose(), twist=None, rolling=None, covariance=Covariance())
+                    for it in due
+                ]
         if reading.restarted:
             estimates = self._release() if self._frame.pose is not None else []
             self._backlog, self._told_lost = PendingDisplacements(), 0
