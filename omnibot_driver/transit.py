@@ -2,14 +2,13 @@
 
 """Estimates how long a command without a stamp was in transit, from its time of sending.
 
-The middleware reports this time by the sender's clock.
+The middleware reports the time of sending by the sender's clock.
 
 difference = arrival by our clock - sending by the sender's clock;
 offset = the sender's smallest difference;
 delay = difference - offset.
 
-docs/internals/stopping.md explains this estimate and its limits. This module does not read a clock,
-and does not use ROS.
+docs/internals/stopping.md has the reasons and limits. This module must not read a clock or use ROS.
 """
 
 import math
@@ -27,27 +26,26 @@ LARGEST_DRIFT: Final = 5e-4
 corrects a clock."""
 LARGEST_CORRECTION_S: Final = 0.4
 LASTING_DRIFT: Final = 1e-4
-"""Largest assumed drift between two clocks over a long time, in s per s: the tolerance of their
-crystals. The correction by NTP is assumed to add at most ``LARGEST_CORRECTION_S``, in s. It steps
-the clock if the error is larger."""
-CLOCK_RETREATS: Final = 10.0
-"""Factor for the misfit (``_Sender.misfit_s``) of a message that is too early for a sender.
+"""Largest assumed drift between two clocks over a long time, in s per s.
 
-A message that is 1 s too early fits as badly as a message that is 10 s too late. A message is
-assigned to the sender that it fits best.
+This is the tolerance of their crystals. NTP adds at most ``LARGEST_CORRECTION_S``; it steps the
+clock if the error is larger.
 """
+CLOCK_RETREATS: Final = 10.0
+"""Factor by which a message that is too early fits a sender worse than one that is too late."""
 ALIKE_S: Final = 0.02
-"""Largest difference in s between the misfits (``_Sender.misfit_s``) of two senders that fit a
-message equally well. Of these two, the driver assumes the sender whose last message had the higher
-number."""
+"""Difference of misfits (``_Sender.misfit_s``) in s up to which two senders fit a message equally.
+
+The driver then assumes the sender whose last message had the higher number.
+"""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender's clock is regarded as known. If there are
 fewer messages, all of them may have been delayed."""
 
 Differences = tuple[float, float]
-"""Two differences: arrival by our clock minus sending by the sender's clock, in s. For the first
-difference, our clock is our time of day. For the second, it is our steady clock."""
+"""Arrival minus sending by the sender's clock, in s: by our time of day, and by our steady clock.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +72,7 @@ class Delay:
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
     * ``sent_ns``: time of sending by our clock. While the offset of the sender's clock is unknown,
-      there are two possible times: the estimated time, and the time by the sender's own clock.
+      the time by the sender's clock follows as a second possible time.
     """
 
     total_s: float
@@ -105,12 +103,10 @@ class Transit:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """Return the delay of this message.
+        """Return the delay of this message, estimated from earlier messages of its sender.
 
-        The delay is estimated by a comparison with earlier messages of the sender. The sender's
-        first message is assumed to have no delay in transit.
-
-        ``longest_s``: a message with a longer delay is late.
+        A sender's first message is assumed to have no delay in transit. ``longest_s``: a message
+        with a longer delay is late.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -160,10 +156,9 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Return whether message ``number`` can be from this sender.
+        """Return whether message ``number`` can be from this sender; True if the number is unknown.
 
-        The numbers of a sender's messages increase, so the number must be larger than the last one.
-        An unknown number is possible for each sender.
+        The numbers of a sender's messages increase.
         """
         return number is None or self.number is None or self.number < number
 
@@ -171,8 +166,7 @@ class _Sender:
         """Return the smallest and the largest possible misfit of a message to this sender, in s.
 
         The misfit is the time by which the message is too late, or ten times (``CLOCK_RETREATS``)
-        the time by which it is too early. The clocks drift by an unknown amount, so only limits of
-        the misfit are known.
+        the time by which it is too early. The unknown drift of the clocks makes it uncertain.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
@@ -189,10 +183,9 @@ class _Sender:
 
 
 class _Offset:
-    """The offset of one of our two clocks from a sender's clock.
+    """The offset of one of our two clocks from a sender's clock: the smallest difference so far.
 
-    The offset is the smallest difference so far. A difference is the arrival by our clock minus the
-    sending by the sender's clock.
+    A difference is the arrival by our clock minus the sending by the sender's clock.
     """
 
     def __init__(self, difference_s: float, at_s: float) -> None:
@@ -203,8 +196,8 @@ class _Offset:
     def late_s(self, difference_s: float, at_s: float) -> float:
         """Return the least time in s by which a message may be late; it may be negative.
 
-        The result is ``difference_s``, minus the offset, minus the largest possible drift.
-        ``difference_s``: arrival by our clock minus sending by the sender's clock.
+        The largest possible drift is subtracted. ``difference_s``: arrival by our clock minus
+        sending by the sender's clock.
         """
         return difference_s - self._least_s - self._drift_s(at_s)
 

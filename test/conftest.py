@@ -43,8 +43,8 @@ WAITING = ("faults", "system", "tools")
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Order the test files for parallel workers: the longest first, then two kinds by turns.
 
-    The tests in files of one kind wait in real time, and those in files of the other kind compute.
-    If many waiting tests ran at once, their drivers would get too little processor time.
+    If many tests that wait in real time ran at once, their drivers would get too little processor
+    time. So files of computing tests lie between them.
     """
     if not hasattr(config, "workerinput"):
         return

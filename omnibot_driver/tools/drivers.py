@@ -38,8 +38,7 @@ def running_drivers(node: Any) -> list[str]:
 def discovery_advice(environment: Mapping[str, str] = os.environ) -> str:
     """Return advice to append to the message that no driver was found; usually empty.
 
-    The advice is for a tool that uses a discovery server, but is not a super client. Such a tool
-    cannot list the running drivers.
+    With a discovery server, only a super client can list the running drivers.
     """
     if not environment.get("ROS_DISCOVERY_SERVER"):
         return ""

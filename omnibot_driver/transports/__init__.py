@@ -2,8 +2,7 @@
 
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-Every LinkError says what to do. The transports know descriptors and bytes; they know neither
-boards nor the threads that use them.
+Every LinkError says what to do. The transports must not know boards, or the threads that use them.
 """
 
 from collections.abc import Mapping
@@ -53,7 +52,7 @@ class Transport(Protocol):
     def ends_with_us(self) -> bool:
         """Whether the board is in this process, such as a simulated board in memory.
 
-        Such a board ends with this process, so the driver does not start a guard process for it.
+        Such a board needs no guard process.
         """
 
     @property
@@ -63,16 +62,15 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet; return an empty packet if none arrives for a while.
 
-        Raises LinkError if the only line, or the last of several, is lost. Raises LinesChanged if
-        one of several lines was lost or opened again.
+        Raises LinkError if the only line or all lines are lost. Raises LinesChanged if one of
+        several lines was lost or opened again.
         """
 
     def write(self, packets: Packets) -> None:
         """Write all packets.
 
-        If one of several lines is missing, this line gets only the bytes that it accepts at once,
-        and its other bytes are discarded. Raises LinkError if the connection is lost. Then all
-        bytes that are not sent yet are discarded.
+        A missing line of several gets only the bytes that it accepts at once; the others are
+        discarded. Raises LinkError, and discards all unsent bytes, if the connection is lost.
         """
 
     def write_if_room(self, packets: Packets) -> int:

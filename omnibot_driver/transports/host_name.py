@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The name of a host that is silent: does it still have the address in use?
+"""Finds out whether the name of a silent host still has the address in use.
 
-A host may come back with another address, for example from DHCP. This module looks up names; it
-does not know what is sent to the host.
+A host may return with another address, for example from DHCP. This module must not know what is
+sent to the host.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ least time between two such lookups."""
 class HostName:
     """The name of a host, and whether the host has left the address ``in_use``.
 
-    A lookup can take long. So it runs in a thread of its own, and only one runs at a time.
+    A lookup can take long, so it runs in its own thread, one at a time.
     """
 
     def __init__(self, name: str, in_use: str) -> None:

@@ -2,7 +2,7 @@
 
 """Rejects names of ports that can never be opened, and explains why a port cannot be opened now.
 
-Every text says what to do. This module knows pyserial's URLs and errors; it opens nothing.
+Every text says what to do. This module knows pyserial's URLs and errors, and opens no port.
 """
 
 import contextlib
@@ -23,10 +23,9 @@ from omnibot_driver.transports import NOT_POLLABLE
 def check_address(url: str, parameter: str = "port", *, pollable: bool = False) -> None:
     """Raise ParameterError if no attempt to open this port can ever succeed.
 
-    ``pollable``: whether the port must have a file descriptor.
+    A missing device or an unknown host is accepted, because it may appear later. No port is opened.
 
-    This function opens nothing. It accepts a missing device and an unknown host, because they may
-    appear later.
+    ``pollable``: whether the port must have a file descriptor.
     """
     try:
         port = serial.serial_for_url(url, do_not_open=True)
@@ -130,7 +129,7 @@ def _no_terminal(url: str, parameter: str) -> str:
 def _owner(path: str) -> str:
     """Return number and name of the process that has locked the file ``path``, in brackets.
 
-    Return an empty text if no process has locked it, or if its name cannot be read.
+    The result is empty if no process has locked the file, or if the name cannot be read.
     """
     with contextlib.suppress(OSError, ValueError):
         status = os.stat(path)

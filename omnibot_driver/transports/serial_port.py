@@ -36,12 +36,11 @@ PSEUDO_TERMINALS: Final = range(136, 144)
 
 
 class SerialPort:
-    """A ``Transport`` of one channel of bytes: an open port, used by this process alone.
+    """A ``Transport`` of one channel: an open port, used by this process alone.
 
     ``parameter``: the parameter that names the port, for messages.
 
-    ``close`` must leave DTR and RTS raised. Otherwise the next opening would raise them again, and
-    some boards restart when these signals are raised.
+    ``close`` must leave DTR and RTS raised: if the next opening raises them, some boards restart.
     """
 
     ends_with_us = False
@@ -182,10 +181,10 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes. While the port accepts none, sleep; pyserial would not sleep.
+    """Write all bytes, and sleep while the port accepts none; pyserial would not sleep.
 
-    Raises TimeoutError if the port accepts no further bytes, and 0.2 s (``WRITE_TIMEOUT_S``) have
-    passed since the beginning of the write.
+    Raises TimeoutError if bytes remain 0.2 s (``WRITE_TIMEOUT_S``) after the beginning of the
+    write.
     """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:

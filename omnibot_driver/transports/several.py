@@ -73,8 +73,8 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        The guard process gets copies of these descriptors. It must not have a copy of a missing
-        line's descriptor, because the driver could then not open this line again.
+        The guard process gets copies of them. With a copy of a missing line's descriptor, the
+        driver could not open this line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -100,8 +100,7 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line was lost or opened again. Raises LinkError if all lines are
-        missing.
+        Raises LinesChanged if a line was lost or opened again, LinkError if all lines are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -131,11 +130,11 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line.
 
-        * If a line does not accept all bytes at once, the remaining bytes wait, and are sent later.
-        * If a line has had waiting bytes for 0.2 s without a break, they are discarded, and the
-          line is regarded as missing.
-        * If the port of a missing line is still open, only the bytes that the port accepts at once
-          are written to it.
+        * A line that does not accept all bytes: the other bytes wait.
+        * A line with waiting bytes for 0.2 s without a break: the bytes are discarded, and the line
+          is regarded as missing.
+        * A missing line whose port is still open: only the bytes that the port accepts at once are
+          written.
         """
         now = time.monotonic()
         with self._writing:
@@ -206,11 +205,10 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write the waiting bytes.
+        """Write the waiting bytes, and let ``poll`` report when a full line accepts more.
 
-        If a line does not accept all of its waiting bytes, ``poll`` reports when it accepts more.
-        If a line has had waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) without a break, it is
-        regarded as missing.
+        A line with waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) without a break becomes a missing
+        line.
         """
         with self._writing:
             for line in self._lines:
@@ -293,8 +291,7 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
 
-        If the line is regarded as missing, but its port is still open, write only the part of
-        ``data`` that the port accepts at once.
+        A missing line whose port is still open gets only the bytes that the port accepts at once.
         """
         if self.port is None:
             return True

@@ -2,8 +2,8 @@
 
 """``sim://``: a simulated board inside this process, as a transport.
 
-Options follow a question mark: ``sim://?seed=1&lose=0.001``. This module knows the name of the
-simulated board's package; it does not know the meaning of the board's bytes.
+Example with options: ``sim://?seed=1&lose=0.001``. This module must not know the meaning of the
+board's bytes.
 """
 
 import threading

@@ -2,8 +2,7 @@
 
 """Datagrams to one host: ``udp://host:port``. Each further channel uses the next higher port.
 
-A host that does not answer is treated as a silent board, because it may answer later. It causes an
-error only if its name has got another address.
+A silent host causes no error, because it may answer later. A new address of its name does.
 """
 
 import contextlib

@@ -2,7 +2,7 @@
 
 """How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-This module depends on the line's baud rate, but not on the frames. All times are in s.
+This module does not know the frames. All times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,8 +16,7 @@ PACKET: Final = 62
 DRIFT: Final = 1.0002
 """Real period of the adapter's timer, divided by its nominal period.
 
-With the nominal period, packets would end at only a few positions in the board's tick. With the
-real one, the timer drifts: within 10 s, packets have ended at every position in the tick.
+The timer drifts, so that within 10 s packets end at every position in the board's tick.
 """
 
 Handed = tuple[float, bytes]

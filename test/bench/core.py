@@ -121,7 +121,7 @@ def linearity() -> list[str]:
 def cold(ticks: int) -> str:
     """Measure the time from an IMU frame's bytes to its reading, with warm and with cold caches.
 
-    In every second tick, the caches are overwritten before the measurement, so they are cold.
+    In every second tick, the caches are overwritten first.
     """
     session, board = _session(), SimulatedBoard(BoardSettings(seed=1, running=True))
     other = bytearray(OTHERS_BYTES)

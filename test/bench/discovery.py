@@ -2,8 +2,8 @@
 
 """Measure the cost of discovery in a fleet, with and without a Fast DDS discovery server.
 
-The program prints rows of the table in docs/fleet.md. All traffic is UDP. Run this as root, in a
-network namespace without other traffic:
+The output is rows of the table in docs/fleet.md. Run this as root, in a network namespace without
+other traffic:
 
     unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]
 """
@@ -21,10 +21,9 @@ PORT: Final = "11811"
 WINDOW_S: Final = 30.0
 """Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Time in s for which the program waits twice.
+"""Time in s for the drivers to start, and for the last packets of the search to arrive.
 
-First it waits until the drivers have started. After the search for the drivers, it waits until the
-last packets of the search have arrived. No event reports the last packet, so the time is fixed.
+No event reports the last packet.
 """
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """

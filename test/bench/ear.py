@@ -1,14 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A subscriber in its own process.
+"""A subscriber in its own process: it records each Imu and Odometry until stdin is closed.
 
-It records the time of each Imu and Odometry until stdin is closed.
+Arguments: namespaces. Output: a JSON object with two arrays for each namespace. All times are by
+the steady clock, in s.
 
-The arguments are namespaces. The output is a JSON object with two arrays for each namespace:
+``heard``: time and acceleration along x of each Imu.
 
-``heard``: for each Imu, the steady clock's time in s, and the acceleration along x.
-
-``odometries``: for each Odometry, an array that contains only the time.
+``odometries``: time of each Odometry, as an array of one element.
 """
 
 import json

@@ -2,8 +2,7 @@
 
 """The Fejemis's part of ``make bench``: how late the drive board gets the front wheel's angle.
 
-The front board reports the angle, and the driver relays it to the drive board. The two simulated
-boards have their own process. Other processes keep the computer busy.
+The driver relays the angle from the front board. Other processes keep the computer busy.
 """
 
 import contextlib
@@ -44,10 +43,10 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both simulated boards in real time. Then send a list of delays in s to ``results``.
+    """Run both simulated boards in real time, then send a list of delays in s to ``results``.
 
-    A delay is the time from the front board's report of an angle until the drive board receives
-    this angle from the driver. The wheel swings, so that successive angles differ.
+    A delay is the time from the front board's report of an angle to its arrival at the drive board.
+    The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()
     drive, _ = masters
@@ -138,9 +137,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     """Measure the delays. Return an empty list of figures, and the rows of a table.
 
-    The benchmarks of other boards return figures that compare the driver with the floor: the
-    smallest program with the same output. The Fejemis has no floor, so its list of figures is
-    empty.
+    The list is empty because the Fejemis has no floor to compare with.
     """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",

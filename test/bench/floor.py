@@ -2,15 +2,14 @@
 
 """The floor: the smallest program that has the same output as the driver, without any checks.
 
-``measurements PORT NAMESPACE``: publish an Imu for every IMU frame; for every delta frame,
-publish an Odometry and a JointState.
+``measurements PORT NAMESPACE``: publish an Imu for every IMU frame, and an Odometry and a
+JointState for every delta frame.
 
 ``commands PORT NAMESPACE``: write a frame for every cmd_vel.
 
-``bare PORT NAMESPACE``: only create the driver's topics and services. This shows how much memory
-ROS needs.
+``bare PORT NAMESPACE``: only create the driver's topics and services, to show the memory of ROS.
 
-The benchmark recognizes each Imu and each command by a number in it.
+Each Imu and each command contains a number for the benchmark.
 """
 
 import os

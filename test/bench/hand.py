@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command several robots in turn, 40 times a second each, for a number of seconds.
+"""Command several robots in turn, 40 times a second each.
 
-Arguments: seconds and namespaces. Output: a JSON list with one array for each namespace. The array
-has an item for each command: the steady clock's time in s, and the speed in the board's units.
+Arguments: duration in s, and namespaces. Output: a JSON list with an array for each namespace. An
+array has an item for each command: the steady clock's time in s, and the speed in board units.
 """
 
 import json

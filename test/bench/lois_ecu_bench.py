@@ -2,8 +2,8 @@
 
 """The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-The driver and the floor (the smallest program with the same output, without any checks) get the
-same bytes, which were recorded at rest.
+The driver and the floor (the smallest program with the same output) get the same bytes of a robot
+at rest.
 """
 
 import bisect
@@ -38,9 +38,8 @@ No event reports that they are ready.
 class Stage:
     """Boards on pseudo-terminals, which all send the same recorded stream.
 
-    ``paths``: names of the terminals.
-
-    ``heard``: for each board, the commands that it has read. A command is a pair: time in s, bytes.
+    ``paths``: names of the terminals. ``heard``: for each board, the commands as (time in s,
+    bytes).
     """
 
     def __init__(self, boards: int) -> None:

@@ -2,9 +2,8 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-The driver is compared with the floor: the smallest program with the same output, without any
-checks. Driver and floor each have their own simulated controller on UDP. While the driver waits for
-the reply to a query, a new speed waits too. A stop does not wait: the driver sends it at once.
+The driver and the floor (the smallest program with the same output) each have a simulated
+controller on UDP. In the driver, a new speed waits for the reply to a query; a stop does not.
 """
 
 import time
@@ -53,10 +52,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with the floor, and an empty list.
-
-    The floor is the smallest program with the same output. The list is for further sections of the
-    report.
+    """Return figures that compare the driver with the floor, and an empty list of further sections.
     """
     windows = 2 if quick else 12
     with ExitStack() as stack:

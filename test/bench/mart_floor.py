@@ -2,9 +2,8 @@
 
 """The floor for a MART: the smallest program with the same output, without any checks.
 
-``HOST PORT NAMESPACE``: query encoder and heading in turn, each 16 times a second. Publish an
-Odometry and a JointState for each encoder count. Send RM (start) or RMCS (change of speed) for
-every cmd_vel.
+``HOST PORT NAMESPACE``: query encoder and heading 16 times a second each, and publish an Odometry
+and a JointState for each encoder count. Send RM or RMCS for every cmd_vel.
 """
 
 import socket

@@ -2,10 +2,9 @@
 
 """Command several MART robots with the same speed, which changes every 1 to 3 s and may be zero.
 
-Arguments: the duration in s, and the namespaces of the robots.
-
-Output: a JSON list with one array for each namespace. Each array has a pair for each speed: the
-time at which the speed was first published, in s of the steady clock, and the speed in m/s.
+Arguments: duration in s, and namespaces. Output: a JSON list with an array for each namespace. An
+array has a pair for each speed: the steady clock's time of its first message in s, and the speed in
+m/s.
 """
 
 import json
@@ -16,8 +15,10 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Speeds in m/s that are commanded in this order, again and again. During the two zeros at
-the end of the list, the robot comes to rest, so that it can be started again."""
+"""Speeds in m/s that are commanded in this order, again and again.
+
+The robot comes to rest during the two zeros, so that it can start again.
+"""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 

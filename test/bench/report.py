@@ -2,10 +2,8 @@
 
 """The performance report, which ``make bench`` writes into docs/internals/performance.md.
 
-The floor is the smallest program with the same output as the driver, without any checks.
-
 ``--quick`` shortens all measurements, to test that the program runs. The exit code is 1 if a goal
-is missed.
+is missed. The floor is the smallest program with the same output as the driver.
 """
 
 import argparse

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurement of the driver and the floor on a simulated small computer.
+"""Measurement of the driver and the floor on a simulated small computer. Only root can run it.
 
-The floor is the smallest program with the same output as the driver, without any checks. Linux's
-cgroups give each of the two programs a share of one core. The period of a cgroup is the shortest
-that the kernel permits, so the programs run evenly. Only root can run this measurement.
+The floor is the smallest program with the same output as the driver. Linux's cgroups give each
+program a share of one core, with the shortest period, so that the programs run evenly.
 """
 
 import math
@@ -21,8 +20,7 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core. The measurement is repeated for each share: the driver gets this share, and
-the floor gets an equal share. The floor is the smallest program with the same output."""
+"""Shares of one core. In each measurement, driver and floor each get the same share."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""
@@ -88,9 +86,8 @@ class Group:
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
     """Return the rows of a table: driver and floor for each share of one core.
 
-    ``seconds``: duration of the measurement for each share.
-
-    If cgroups cannot be used, return a sentence that gives the reason.
+    ``seconds``: duration for each share. If cgroups cannot be used, return a sentence with the
+    reason.
     """
     try:
         return _table(parts, seconds)

@@ -2,9 +2,9 @@
 
 """Timers that measure the processor time of each stage of the driver's reader.
 
-The driver's process imports this module first. When the process ends, the module writes a JSON
-object to the file in the environment variable SPLIT. The object contains the processor
-time of each stage, in s. Its entry ``passed`` is the time for which the reader ran, in s.
+The driver's process imports this module first. At its end, a JSON object with the times in s is
+written to the file in the environment variable SPLIT. ``passed``: the time for which the reader
+ran.
 """
 
 import atexit
@@ -28,10 +28,9 @@ within: list[float] = []
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Replace a method by one that also measures processor time, and adds this time to ``stage``.
+    """Replace a method by one that adds its processor time in the reader's thread to ``stage``.
 
-    Only the time in the reader's thread is measured. The time of other stages that the method calls
-    is not included.
+    The time of other stages that the method calls is left out.
     """
     method: Callable[..., Any] = getattr(owner, name)
 

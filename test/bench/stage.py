@@ -2,8 +2,7 @@
 
 """Simulated boards on pseudo-terminals that send the stream of nominal mode and record commands.
 
-Within each tick of 10 ms, the boards send one after the other. Every IMU frame has a number in its
-first word.
+The boards take turns within each tick of 10 ms. The first word of every IMU frame is a number.
 """
 
 import heapq
@@ -28,8 +27,10 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Largest number in the first word of IMU frames. The number changes by 1 from frame to frame: it
-goes up from 0 to ``TURN``, then down to 0, and so on."""
+"""Largest number in an IMU frame.
+
+From frame to frame, the number goes up by 1 from 0 to ``TURN``, then down to 0, and so on.
+"""
 NOISE = 997
 """Number of ticks after which the random noise of the gyro and of the acceleration repeats."""
 
@@ -57,10 +58,7 @@ def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
 
 
 def imu_ends() -> Iterator[int]:
-    """Yield, for each tick, where its IMU frame ends in the stream of one board.
-
-    The value is the number of bytes from the beginning of the stream to the end of the IMU frame.
-    """
+    """Yield, for each tick, the end of its IMU frame, in bytes from the beginning of the stream."""
     begun = 0
     for tick in count():
         yield begun + IMU_BYTES

@@ -1,11 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays of a board's data. Each step is a relay with one more task than the step before.
+"""Relays of a board's data, each with one more task than the relay before.
 
-The floor is the smallest program with the same output as the driver, without any checks. Each relay
-has more tasks than the floor, and fewer than the driver.
-
-Arguments: the step (a key of STEPS), the port, the namespace. The relay writes nothing to the port.
+Each has more tasks than the floor (the smallest program with the same output as the driver), and
+fewer than the driver. Arguments: a key of STEPS, the port, the namespace. Nothing is written to the
+port.
 """
 
 import os

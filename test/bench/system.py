@@ -41,11 +41,9 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios for each adapter. A ratio is the driver's value divided by the floor's
-value.
+"""Largest allowed ratios of driver to floor, for each adapter; None means no limit.
 
-The four ratios are, in this order: median latency, 99th percentile of the latency, processor
-time, and latency of cmd_vel. None means that a ratio has no limit.
+Order: median latency, 99th percentile of the latency, processor time, latency of cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -262,10 +260,9 @@ def split(seconds: float) -> list[str]:
 def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return, for each message, when its frame was delivered, in s, and its latency, in µs.
+    """Return, for each message, the delivery time of its frame in s, and its latency in µs.
 
-    The function finds the frame by its number. ``unit``: the value in a message is the number of
-    its frame, multiplied by this factor.
+    The value in a message is the number of its frame, multiplied by ``unit``.
     """
     found = []
     for at, value in heard:

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Write the native id and the name of each thread to a file.
+"""Write the native id and the name of each thread to the file in the environment variable NAMES.
 
-The environment variable NAMES has the path of this file. The driver's process imports this module
-before the driver starts.
+The driver's process imports this module before the driver starts.
 """
 
 import os

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test bench in simulated time that connects a session to the simulated robot of any board.
+"""Test bench in simulated time: a session, connected to the simulated robot of any board.
 
-The tests of the rules for motion (what may move or stop a robot) use this bench.
+It is for tests of the rules for motion (what may move or stop a robot).
 """
 
 from collections.abc import Callable

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find gains of the manual's control law that suit a motor, and predict their effect.
+"""Finds the gains of the manual's control law that suit a motor, and predicts their effect.
 
-The best gains have the smallest absolute errors after a step of the command or of the load.
+The best gains have the smallest absolute errors after steps of the command and of the load.
 """
 
 from collections.abc import Sequence
@@ -83,8 +83,7 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    ``now``: the present gains. For each motor, the errors with other gains are divided by the
-    errors with these gains.
+    The errors of each motor are divided by its errors with the present gains ``now``.
 
     Raises ToolError if no gains are within the limits.
     """

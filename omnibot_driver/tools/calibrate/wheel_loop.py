@@ -2,9 +2,8 @@
 
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-A tick is the control period of 10 ms. Speeds are in encoder counts per tick, efforts in PWM steps,
-times in ticks. The wheel must not change its direction, because the dry friction is assumed to be
-constant. This module knows the motor and the control law; it does not know measurements or radians.
+A tick is the control period of 10 ms. Units: encoder counts per tick, PWM steps and ticks. The dry
+friction is constant, so a wheel must not change its direction.
 """
 
 from dataclasses import dataclass
@@ -49,13 +48,10 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
 ) -> Array:
-    """Simulate a wheel with the manual's control law; return its speed during each tick.
+    """Return the speed of a simulated wheel during each tick, with the manual's control law.
 
-    The commanded speed and the load change from 0 to ``command`` and ``load`` at the same time.
-
-    ``ticks``: duration of the simulation. ``command``: in counts per tick.
-
-    ``load``: effort that the load needs, in PWM steps.
+    In the first tick, the commanded speed becomes ``command``, in counts per tick, and the load
+    becomes ``load``, in PWM steps. ``ticks``: duration of the simulation.
     """
     forward, proportional, integral = gains.feed_forward, gains.proportional, gains.integral
     shape = np.broadcast(forward, proportional, integral).shape

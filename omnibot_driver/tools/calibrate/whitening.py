@@ -19,9 +19,9 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
     ``rows``: rows of successive residuals.
 
-    ``lags``: the largest lag. If it is 1, the value for lag 1 is limited to the range from -0.5
-    (only displaced encoder marks) to 0 (only independent errors). If it is larger, each value is
-    multiplied by a factor that decreases with the lag.
+    * ``lags`` is 1: the value for lag 1 is limited to the range -0.5 (only displaced encoder marks)
+      to 0 (only independent errors).
+    * ``lags`` is larger: the values are multiplied by a factor that decreases with the lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -43,9 +43,7 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 def whitener(of_lags: Column, length: int) -> Column:
     """Return the matrix that removes an autocorrelation from a row of ``length`` residuals.
 
-    For a shorter row, use the upper left part of this matrix.
-
-    ``of_lags``: the autocorrelation for lags from 0 on.
+    Its upper left part does so for a shorter row. ``of_lags``: the autocorrelation from lag 0 on.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]

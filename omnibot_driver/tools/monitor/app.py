@@ -151,9 +151,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        To draw again, Textual starts a new thread that reads keys. The old thread has survived
-        SIGSTOP and would read keys, too. So ``suspend`` ends the old thread before the new one
-        starts.
+        Textual then starts a new thread that reads keys. ``suspend`` first ends the old thread,
+        which would read keys too.
         """
         with self.suspend():
             pass

@@ -53,12 +53,12 @@ IMU_PARAMETER: Final = "imu_frame"
 
 
 class Feed:
-    """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
+    """The connection to the driver ``name`` in ``namespace``, until ``close`` is called.
 
     Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
 
-    ``dead_man``: the dead man's switch, with which the user drives the robot. With this switch, the
-    monitor publishes ``cmd_vel`` while a key is held. None if the monitor must not move the robot.
+    ``dead_man``: the dead man's switch whose commands are published on ``cmd_vel``; None if the
+    monitor must not move the robot.
     """
 
     def __init__(
@@ -207,11 +207,7 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """Return what this driver's board lacks: a subset of ``imu``, ``start`` and ``pause``.
-
-        While the monitor does not know whether the board has one of them, the result does not
-        contain it.
-        """
+        """Return what the board is known to lack, of ``imu``, ``start`` and ``pause``."""
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}

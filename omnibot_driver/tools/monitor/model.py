@@ -2,8 +2,7 @@
 
 """The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
-The model keeps NaN and infinity for the user to see. The model must not know ROS, terminals or the
-clock.
+NaN and infinity are kept for the user to see. The model must not know ROS, terminals or the clock.
 """
 
 import math
@@ -30,10 +29,10 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: terms of the largest motion of the pose between two messages.
+"""``JUMP_M``, ``JUMP_MPS``: in the time t, the pose may move JUMP_M + JUMP_MPS · t, in m.
 
-In the time t between two messages, the pose may move by JUMP_M + JUMP_MPS · t, in m. If the pose
-moves farther, the odometry was reset, and the model begins a new path.
+If the pose moves farther between two messages, the odometry was reset, and the model begins a new
+path.
 """
 
 
@@ -53,9 +52,9 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """The values to show at one moment. An unknown value is None or empty.
+    """The values to show at one moment. An unknown or outdated value is None or empty.
 
-    An outdated value is None or empty too, except ``state``, ``estop``, ``pose`` and ``path``.
+    ``state``, ``estop``, ``pose`` and ``path`` are shown even if they are outdated.
 
     ``estop_asked``: whether the e-stop is requested, but not yet confirmed by the driver.
 
@@ -65,7 +64,7 @@ class View:
 
     ``said``: the reply to the user's last action.
 
-    ``lacks``: what the board does not have. Possible members: ``imu``, ``start``, ``pause``.
+    ``lacks``: what the board does not have, of ``imu``, ``start`` and ``pause``.
     """
 
     driver: str

@@ -2,8 +2,8 @@
 
 """Steers the robot by keys, with a dead man's switch.
 
-A terminal does not report the release of a key, so each report of a pressed key moves the robot
-only briefly. The module knows keys and times; it does not know ROS or terminals.
+A terminal does not report the release of a key, so each pressed key moves the robot only briefly.
+This module must not know ROS or terminals.
 """
 
 import math
@@ -20,8 +20,7 @@ repetitions are lost or late."""
 ASLEEP_S: Final = 0.5
 """Longest time in s between two calls of ``command`` while the program runs.
 
-After a longer time, the user or the computer has probably suspended the program. Keys from before
-or during the suspension are discarded.
+After a longer time, the program was suspended, and earlier keys are discarded.
 """
 DEAF_S: Final = 0.3
 """Time in s for which keys do not steer after the program was suspended.
@@ -51,8 +50,7 @@ MOTIONS: Final = {
 class DeadMan:
     """A dead man's switch that converts pressed keys to commands.
 
-    The caller calls ``command`` regularly. Another thread may call ``press``. No lock is needed,
-    because ``press`` stores key and time in one assignment.
+    The caller must call ``command`` regularly. Another thread may call ``press`` without a lock.
     """
 
     def __init__(self) -> None:
@@ -95,10 +93,10 @@ class DeadMan:
         return part * self.fastest[0], part * self.fastest[1]
 
     def command(self, now_s: float) -> BodyTwist | None:
-        """Return the command to publish now; None if nothing is to be published.
+        """Return the command to publish now; None if there is none.
 
-        While a key moves the robot, the command is a motion. Afterwards, the next five commands
-        (``ZEROS``) are zero.
+        The command is a motion while a key moves the robot, and zero five times (``ZEROS``)
+        afterwards.
         """
         self._notice_sleep(now_s)
         self._asked_s = now_s

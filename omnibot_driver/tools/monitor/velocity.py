@@ -26,10 +26,12 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 class VelocityTopic:
     """The monitor's subscription and publisher of ``cmd_vel``.
 
-    Both use the message type of the driver's subscription, because a process must use only one type
-    for a topic.
+    Both have the message type of the driver's subscription: a process must use one type for a
+    topic.
+
     ``heard``: function that is called with each command on the topic.
-    ``dead_man``: the switch whose commands are published; if None, nothing is published.
+
+    ``dead_man``: the switch whose commands are published; None: no command is published.
     """
 
     def __init__(

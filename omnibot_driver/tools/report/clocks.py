@@ -38,10 +38,9 @@ def step(log: Log) -> ClockStep | None:
 
 
 def _step(series: Series) -> ClockStep | None:
-    """Return the largest step between messages whose delays change suddenly and for good.
+    """Return the largest sudden and lasting change of the messages' delays; None if there is none.
 
-    After a busy moment, the delays become as small as before. So the smallest delays of all
-    messages before and after it do not differ.
+    Only the smallest delays count, because a busy computer delays messages only for a time.
     """
     rows = series.only(np.isfinite(series.stamp_s))
     rows = _by_stamp(rows)

@@ -13,8 +13,8 @@ YAW_WEIGHT_M: Final = 0.143
 WHEEL_WEIGHT_M: Final = 0.029
 """Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
 
-The factors fit an OmniBot, but they are used for all robots. This is accurate enough, because they
-only decide which speeds are motion, and how much each axis counts in the search for the lag.
+They are the OmniBot's, and accurate enough for all robots: they only separate motion from
+standstill, and weight the axes in the search for the lag.
 """
 
 
@@ -24,8 +24,9 @@ class Pair:
 
     ``weights``: for each axis, the factor that converts a value to the speed of a wheel's rim in
     m/s.
-    ``scales``: for each axis, the driver's parameter that scales the commands; empty for a robot
-    with two wheels.
+
+    ``scales``: for each axis, the parameter that scales the commands; empty for a robot with two
+    wheels.
     """
 
     topic: str
@@ -87,8 +88,7 @@ def shown(log: Log) -> list[Pair]:
 def _sampled(series: Series) -> Series:
     """Return the finite rows that have a timestamp, with timestamps by the recorder's clock.
 
-    The times of commands, states and e-stops are by the same clock, so the rows can be compared
-    with them.
+    The commands, states and e-stops have times by the same clock.
     """
     rows = series.only(series.finite & np.isfinite(series.stamp_s))
     return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)

@@ -54,10 +54,9 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return a line of about 3000 points that has the extremes of a longer line.
+    """Return about 3000 points that keep the extremes of a longer line.
 
-    The longer line is cut into pieces of equal length, and each piece gives its minimum and
-    maximum. A line of at most 3000 points is returned unchanged.
+    A line of at most 3000 points is returned unchanged.
     """
     if len(times_s) <= POINTS:
         return times_s, values

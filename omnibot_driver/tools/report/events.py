@@ -16,11 +16,10 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which /diagnostics shows whether the driver still ran at the end of a log.
+"""Time in s after which /diagnostics shows whether the driver still ran in its last state.
 
-If the last state in the log is "disconnected", the driver has ended, or it has lost its board. If
-the driver still runs, /diagnostics shows this state more than ``SILENT_S`` after the state began.
-Otherwise the driver has ended.
+A last state "disconnected" means that the driver has ended or has lost its board. Only a running
+driver still shows the state in /diagnostics after this time.
 """
 
 
@@ -83,8 +82,7 @@ def _lost(states: list[Span]) -> list[Span]:
 def _alive(log: Log, state: Span) -> bool:
     """Return whether the driver was still running in ``state``, the last state in the log.
 
-    It was running if /diagnostics shows this state more than 2 s (``SILENT_S``) after the state
-    began.
+    A running driver shows the state in /diagnostics more than 2 s (``SILENT_S``) after it began.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
@@ -144,8 +142,7 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 def _told_elsewhere(status: Status) -> bool:
     """Return whether the report of the diagnostics omits this status.
 
-    It omits a status that another finding reports, such as a latched e-stop or a paused board. It
-    also omits the board's status in the first 3 s (``FIRST_SECONDS``).
+    Another finding reports it, or it is the board's status in the first 3 s (``FIRST_SECONDS``).
     """
     if status.name.endswith("Commands"):
         return "e-stop" in status.message

@@ -48,8 +48,8 @@ class Answer:
 
     ``error``: for each axis, rms of measured - gain · commanded motion.
 
-    ``spread``: for each axis, ``error`` divided by the rms of the command. Infinite if the command
-    was not constant for long enough, because the gain then depends on how fast the motors react.
+    ``spread``: for each axis, ``error`` divided by the rms of the command; infinite if no command
+    was constant for long enough, because the gain then includes the reaction time of the motors.
     """
 
     lag_s: float
@@ -72,9 +72,9 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The returned delay is the one with which commands and measurements fit best. The gain of an axis
-    is taken only from the times at which its command was not near zero and had been constant for
-    ``STEADY_S``. If these times are shorter than ``SUSTAINED_S`` in all, all times are used.
+    The delay is the one that fits best. The gains come from constant commands (``STEADY_S``) that
+    are not near zero. If these last less than ``SUSTAINED_S`` in all, the gains come from all
+    commands.
 
     ``usable``: for each measurement, whether to use it.
     """
@@ -116,8 +116,8 @@ def _constant(commands: Series, at_s: Array) -> Mask:
 def judge(log: Log) -> Iterator[Finding]:
     """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    Motion during an e-stop is reported too. Motion without a command is reported only if the log
-    has at least one command.
+    Motion during an e-stop is reported. Motion without a command is reported only if the log has
+    commands.
     """
     yield from _despite_the_estop(log, twists(log))
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
@@ -175,10 +175,9 @@ def _rim_speed(pair: Pair) -> Array:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return, for each time in ``at_s``, whether the driver carried out no commands at that time.
+    """Return, for each time, whether the driver ignored commands, or did so in the last 0.5 s.
 
-    The driver carries out no commands while the e-stop is latched, and while the board does not
-    run. The 0.5 s after each such period are included.
+    The driver ignores commands while the e-stop is latched or the board does not run.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [

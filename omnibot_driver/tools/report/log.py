@@ -51,8 +51,7 @@ class Series:
     def other_clock_s(self) -> float:
         """How far the recorder's clock is ahead of the timestamps' clock, in s.
 
-        The value is the median of arrival time minus timestamp. A median of at most 1 s
-        (``OTHER_CLOCK_S``) can be a delay of the messages, so the value is then 0.
+        Differences of up to 1 s (``OTHER_CLOCK_S``) can be delays of the messages, so they give 0.
         """
         late_s = (self.arrived_s - self.stamp_s)[np.isfinite(self.stamp_s)]
         ahead_s = float(np.median(late_s)) if len(late_s) else 0.0
@@ -119,9 +118,9 @@ class Log:
 
     ``absent``: topics without a message.
 
-    ``topics``: topics that exist, also those without a message, if known.
+    ``topics``: known topics, with or without messages.
 
-    ``alone``: whether everything in /diagnostics belongs to this robot.
+    ``alone``: whether /diagnostics has data of this robot only.
     """
 
     robot: str
@@ -145,9 +144,8 @@ class Log:
     def two_wheels(self) -> bool:
         """Whether the robot has two driving wheels; False without joint_states.
 
-        This distinguishes the two robots that have an IMU. The Fejemis has two driving wheels, and
-        its IMU is mounted upright. The OmniBot has three driving wheels, and its IMU hangs upside
-        down.
+        A Fejemis has two driving wheels and an upright IMU. An OmniBot has three, and its IMU hangs
+        upside down.
         """
         return len(self.wheels) == 2
 

@@ -169,8 +169,8 @@ def spectra(log: Log) -> Figure:
 def timing(log: Log) -> Figure:
     """Draw how evenly messages are timed.
 
-    The first row shows the steps between successive timestamps, minus the median step. The second
-    row shows the delays with which messages arrived, minus the smallest delay.
+    First row: steps between successive timestamps, minus the median step. Second row: delays of
+    arrival, minus the smallest delay.
     """
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")
@@ -254,8 +254,7 @@ def timeline(log: Log) -> Figure:
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
     """Yield a span of time and a colour for each message of a diagnostic status.
 
-    The span lasts until the next message. If the next message is late or missing, the span lasts 1
-    s.
+    A span ends at the next message, or after 1 s if the next message is late or missing.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0

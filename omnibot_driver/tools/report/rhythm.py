@@ -28,10 +28,9 @@ LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Time limit in s, counted from a long step between timestamps.
+"""Time in s within which short steps between timestamps compensate a long one.
 
-If short steps compensate the long step within this time, the timestamps have jumped. If not,
-messages are regarded as missing.
+A long step that is compensated in time is a jump of the timestamps; otherwise messages are missing.
 """
 
 
@@ -39,14 +38,18 @@ messages are regarded as missing.
 class FrameSchedule:
     """The measured timing of a topic.
 
-    A step is the time from one message's timestamp to the timestamp of the next message.
+    A step is the time between the timestamps of two successive messages.
 
-    ``at_s``: the timestamp at which each step begins.
-    ``steps_s``: length of each step. ``period_s``: the median step.
+    ``at_s``, ``steps_s``: start and length of each step. ``period_s``: the median step.
+
     ``gap_at_s``, ``gap_s``: start and length of each gap that the driver's state does not explain.
+
     ``missing``: number of missing messages in each of these gaps.
+
     ``leap_at_s``, ``leap_s``: start and length of each long step that short steps compensate.
+
     ``arrived_s``: time of arrival of each message.
+
     ``late_s``: time from the timestamp of each message to its arrival.
     """
 
@@ -112,12 +115,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step, the index of the first step after its range.
+    """Return, for each long step, the index after the last step that can compensate it.
 
-    Short steps can compensate a long step only within its range. The range begins at the long step.
-    It has ``most`` steps, but ends earlier if another long step comes.
-
-    ``wide``: indices of the long steps.
+    The possible steps are the long step and those after it: ``most`` steps in all, and none from
+    the next long step on. ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
@@ -273,8 +274,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    A restarted driver counts from zero again. So if a count has decreased, its whole new value is
-    regarded as growth.
+    A count that has decreased has restarted at zero, with the driver.
     """
     if not log.alone:
         return None

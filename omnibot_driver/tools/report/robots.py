@@ -38,9 +38,9 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """Return the roles that this topic may have, according to its name.
 
-    The key is the role. The value is a pair: the robot's namespace, and whether the topic fits the
-    role. A topic fits if ``kind`` is a message type of the role. For a role such as ``state``, a
-    node in ``drivers`` must also have this topic in its own namespace.
+    Each role has the robot's namespace, and whether the topic fits: whether its message type
+    ``kind`` is right and, for a role such as ``state``, whether it belongs to a node in
+    ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -57,8 +57,10 @@ def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tupl
     """Return the namespace and the topics of one robot.
 
     ``wanted``: namespace of this robot; None selects the only robot.
+
     ``where``: name of the source of the topics, for error messages.
-    Raises ToolError if there is no such robot, or if ``wanted`` is None and there are several.
+
+    Raises ToolError if this robot does not exist, or if ``wanted`` is None and there are several.
     """
     names = ", ".join(robots)
     if not robots:

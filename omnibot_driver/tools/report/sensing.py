@@ -80,8 +80,7 @@ def at_rest(log: Log, imu: Series) -> Mask:
 class Spectrum:
     """Amplitude spectral densities per √Hz: one row for each frequency, with six columns.
 
-    Columns 0 to 2 are the angular velocity about x, y and z, and 3 to 5 the specific force along
-    these axes.
+    Columns: angular velocity about x, y, z; specific force along x, y, z.
     """
 
     frequency_hz: Array
@@ -91,8 +90,7 @@ class Spectrum:
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
     """Return Welch's mean spectrum of the selected ``rows``; None if there is too little data.
 
-    The selected rows are divided into pieces without missing readings. The mean is taken over the
-    pieces of at least 256 readings.
+    Only unbroken pieces of at least 256 readings are used.
     """
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
@@ -213,7 +211,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the ratio of turns by gyro to turns by odometry, and the sum of all turns in rad.
 
-    Left and right turns both increase the sum. If the odometry has no turns, the result is None.
+    The sum has no signs. The result is None if the odometry has no turns.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

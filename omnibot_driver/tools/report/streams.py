@@ -16,12 +16,12 @@ from omnibot_driver.tools.report.log import Log, Status
 class Stream:
     """The expected timing of a topic.
 
-    ``running``: the states of the driver in which the driver publishes the topic.
+    ``running``: the states of the driver in which it publishes the topic.
 
     ``lost``: keys of those values in the driver's diagnostics that count lost messages.
 
-    ``rates``: keys under which the driver's diagnostics may contain the rate of the topic. The
-    first key that has a value is used.
+    ``rates``: keys of the topic's rate in the driver's diagnostics; the first one with a value is
+    used.
     """
 
     name: str
@@ -33,10 +33,9 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot whose diagnostics contain no rate: the rate keeps its present value, or is NaN
-          for a robot with two wheels.
-        * Several robots: the diagnostics do not show which of them a rate belongs to. So the rate
-          is NaN if the robots have different rates, or none.
+        * One robot without a rate in its diagnostics: the present rate; NaN for a robot with two
+          wheels.
+        * Several robots: their common rate; NaN if their rates differ or are missing.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]
         if log.alone:

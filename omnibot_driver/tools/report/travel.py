@@ -15,11 +15,11 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits, in m and rad, above which a step of the pose is a leap.
+"""``LEAP_M``, ``LEAP_RAD``: limits, in m and rad, of the deviation between pose and twist in a
+step.
 
-A step goes from one message to the next. The limits apply to the part of the step that the twist
-does not show. The driver's own corrections of odom stay below the limits, because
-fastest_linear_speed limits these corrections.
+A step with a larger deviation is a leap. A step goes from one message to the next. The driver's own
+corrections of odom are smaller: fastest_linear_speed limits them.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
@@ -38,10 +38,11 @@ class Steps:
     """The steps from each message of odom to the next.
 
     ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
-    ``off_m``, ``off_rad``: difference between the change of the pose and the motion that the twist
-    shows.
-    ``leap``: whether this difference is too large. In a gap, only a step to the zero pose can be a
-    leap.
+
+    ``off_m``, ``off_rad``: difference between the change of the pose and the motion by the twist.
+
+    ``leap``: whether this difference is too large; in a gap, only for a step to the zero pose.
+
     ``reset``: whether the step is a leap to the zero pose.
     """
 
