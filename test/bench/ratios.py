@@ -13,10 +13,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of a measurement that was made several times.
-
-    Each time, the driver was measured first, and then the floor. No driver can need less than the
-    floor.
+    """The results of a measurement that was made several times, alternately for driver and floor.
 
     ``ours``, ``floor``: the values of driver and floor, in pairs.
 

@@ -64,10 +64,9 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Return the spans in which the board was out of reach: disconnected or connecting.
+    """Return the spans in which the board was disconnected or connecting; joins adjacent spans.
 
-    Spans that end in the first 3 s of the log (``FIRST_SECONDS``) are left out. Successive spans
-    without a time between them are joined.
+    Spans that end in the first 3 s of the log (``FIRST_SECONDS``) are left out.
     """
     lost: list[Span] = []
     for state in states:

@@ -47,7 +47,7 @@ def bench() -> Bench:
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
     """Return each Stop and base velocity (mode 1) as its time in s and its three 16-bit numbers.
 
-    ``mark``: number of the first frame to look at, counted from the beginning of the test.
+    ``mark``: index of the first written packet to look at.
     """
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
@@ -130,10 +130,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """A robot at rest is commanded to drive at (0.3, 0.4) m/s. The acceleration limit is 1 m/s².
-
-    The commands on the line reach this velocity within 0.5 s, always in the same direction.
-    """
+    """A step to (0.3, 0.4) m/s is ramped at the limit of 1 m/s², always in the same direction."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):

@@ -21,10 +21,9 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The e-stop is latched during a drive. The driver sends it at once, and the robot stops.
+    """An e-stop during a drive is sent at once, and stops the robot.
 
-    While the e-stop is latched, the driver refuses commands. It sends only pairs of ES (the board's
-    own emergency stop) and Stop.
+    While it is latched, the driver refuses commands, and sends only pairs of ES and Stop.
     """
     bench.drive(0.5)
     bench.run(0.1)
@@ -70,10 +69,9 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """An e-stop is latched while the port is closed. The answer says that the port is not open.
+    """An e-stop that was latched while the port was closed is sent directly after Stop and S.
 
-    When the port opens again, the driver sends the emergency stop frame directly after the first
-    bytes: Stop and S (start).
+    Stop and S (start) are the first bytes after each opening of the port.
     """
     bench.close()
     assert "port is not open" in estop(bench, True)
@@ -125,10 +123,9 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """After the release of the e-stop, the robot needs some time to speed up.
+    """A robot that speeds up after an e-stop does not cause the notice to call ~/reset.
 
-    The driver does not mistake this for a board that still holds the e-stop. So no notice advises
-    the user to call ~/reset.
+    The notice is for a board that still holds the e-stop.
     """
     for _ in range(3):
         estop(bench, True)

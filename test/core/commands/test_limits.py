@@ -197,7 +197,7 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """A command's stamp is too old, or too far in the future. The command is refused.
+    """A command whose stamp is too old, or too far in the future, is refused.
 
     The refusal contains the age of the stamp, and says that the computers' clocks must agree.
     """

@@ -38,10 +38,9 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """The motion monitor has stopped the robot. A pause in the commands ends the refusal of motion.
+    """After a stop by the motion monitor, a pause in the commands ends the refusal of motion.
 
-    The pause must be as long as the command timeout. It is counted from the last command, not from
-    the stop.
+    The pause is as long as the command timeout, counted from the last command.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -50,10 +49,9 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The motion monitor has stopped the robot, so motion commands are refused.
+    """After a stop by the motion monitor, a zero command ends the refusal of motion.
 
-    A zero command ends this refusal. The zero command itself is accepted, and so are the motion
-    commands that come later.
+    The zero command is accepted.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -80,10 +78,9 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """The motion monitor stops the robot again, more than a minute after the last stop.
+    """A stop by the motion monitor is a first stop if the last one was more than a minute ago.
 
-    The interlock treats this stop as a first stop: motion can be allowed again without ~/start. The
-    same is true for a stop after a call of ~/start.
+    After a first stop, ~/start is not needed. A stop after a call of ~/start is a first stop too.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
@@ -96,10 +93,10 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """The board has no ~/start. The motion monitor has stopped the robot twice within a minute.
+    """On a board without ~/start, a release of the e-stop ends the refusal after a second stop.
 
-    Motion is refused until the user releases the e-stop after the second stop. A release between
-    the two stops does not help.
+    The motion monitor has stopped the robot twice within a minute. A release between the two stops
+    does not help.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

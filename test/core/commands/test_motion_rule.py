@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion rule: only a fresh command moves the robot.
+"""Tests of the motion rule: only a fresh command moves the robot, and only while data arrives.
 
 A command is fresh if it is younger than the timeout, and arrived after the last interruption, such
-as a pause of the board. If the board sends no data, even a fresh command does not move the robot.
+as a pause of the board.
 """
 
 import contextlib
@@ -85,10 +85,9 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The board restarts while the robot drives. After the boot, the driver sends no motion frame.
+    """The driver sends no motion frame to a board that boots after a restart.
 
-    A board is paused after its boot. It could read a byte of a motion frame as the letter S
-    (start).
+    Such a board is paused, and could read a byte of a motion frame as the letter S (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
@@ -106,8 +105,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
     """After a request for a pause or a reset, the driver sends no motion frame.
 
-    In this test, the request does not reach the board, so the robot drives on. Even then, the
-    driver sends no motion frame.
+    The test loses the request, so the board drives on.
     """
     bench.drive(0.4)
     start = len(bench.written)
@@ -219,9 +217,9 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """The driver stalls for 3 s. Then it sends only Stop, until the next command.
+    """After a stall of 3 s, the driver sends only Stop until the next command.
 
-    Its only notice says that the driver itself stalled. It does not blame the board or the sender.
+    Its only notice says that the driver stalled.
     """
     bench.drive(vx=0.3)
     bench.run(0.2)

@@ -114,10 +114,9 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 
 
 def test_what_the_old_scale_rounded_to_nothing_does_not_become_motion() -> None:
-    """The old scale rounds the commanded speed to 0 on the line, so the robot rests.
+    """A speed that the old scale rounded to 0 does not become a motion with the new scale.
 
-    Then the scale changes. With the new scale, the same speed would be a motion, but the robot
-    rests until the next command. The ramp of this command begins at zero.
+    The robot rests until the next command, whose ramp begins at zero.
     """
     limits = SpeedLimits(linear_mps2=0.1)
     bench = Bench(BoardSettings(running=True), limits=limits)

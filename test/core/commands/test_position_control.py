@@ -87,8 +87,8 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
     """The robot turns to a goal by less than half a turn, also after several full turns.
 
-    The board's heading counts full turns, and may begin several turns away from zero. So the driver
-    converts the heading of a goal to the equivalent one that is nearest to the board's heading.
+    The driver converts the goal's heading to the equivalent one that is nearest to the board's
+    heading, which counts full turns.
     """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
@@ -126,8 +126,7 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
     """The driver refuses velocities while it is set to position control.
 
-    With this setting, the board takes each command for a goal. It would interpret a velocity of 0.3
-    m/s as a goal 21 mm from the origin.
+    The board would interpret a velocity of 0.3 m/s as a goal 21 mm from the origin.
     """
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
@@ -222,9 +221,9 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) -> None:
-    """No data arrives for 0.35 s while the robot drives to a goal. The goal is discarded.
+    """A silence of 0.35 s during a drive discards the goal, and a notice says so.
 
-    A notice says so, because a goal is sent only once, and its sender would wait in vain.
+    A goal is sent only once, so its sender would wait in vain.
     """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
@@ -238,10 +237,9 @@ def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) ->
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """The odometry is reset while the robot drives to a goal. This reset discards the goal.
+    """A reset of the odometry discards the goal of the drive, and the driver sends the Stop frame.
 
-    The driver sends the Stop frame. A velocity frame with zeros (mode 1) would be a goal at the
-    origin.
+    A velocity frame with zeros (mode 1) would be a goal at the origin.
     """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
@@ -256,10 +254,9 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", ["linear_scale", "angular_scale"])
 def test_a_new_scale_of_odom_discards_a_goal(bench: Bench, scale: str) -> None:
-    """If a scale of odom changes during a drive to a goal, the driver discards the goal.
+    """A new scale of odom discards the goal of the drive, with a notice; the next goal is accepted.
 
-    The goal was 3 m ahead. With the new scale, it would be at another place of the board's frame. A
-    notice says that the goal is discarded. The driver accepts the next goal.
+    With the new scale, the goal would be at another place of the board's frame.
     """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(0.2)
@@ -283,7 +280,7 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 ) -> None:
     """A robot that drives away from its goal is stopped, and a notice names the board's switch.
 
-    The switch is set to velocity control, so the board takes the goal for a velocity.
+    With the switch at velocity control, the board takes the goal for a velocity.
     """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()

@@ -39,11 +39,9 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """The e-stop is sent without delay, twice at once, and then repeated without end.
+    """The e-stop is sent twice without delay, just after a command, and then repeated without end.
 
-    A user latches the e-stop just after a command was sent, and the driver does not wait. Each
-    transmission consists of ES (the board's own emergency stop) and Stop, because some firmware
-    does not know ES.
+    Each time, ES and Stop are sent, because some firmware does not know ES.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

@@ -75,9 +75,9 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """A command expires. The driver sends Stop at 20 Hz.
+    """After a command has expired, the driver sends Stop at 20 Hz.
 
-    It sends Stop for 1 s if data shows that the robot is at rest. Otherwise it sends Stop for 5 s.
+    It does so for 1 s if data shows that the robot is at rest, otherwise for 5 s.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
@@ -102,11 +102,7 @@ def test_stop_never_waits(stream: Stream) -> None:
 
 
 def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
-    """The driver has just repeated the last command when a new command arrives.
-
-    It sends the new command at once. Only an earlier new command can make a new command wait; a
-    repetition cannot.
-    """
+    """A new command is sent at once, also just after a repetition of the last command."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(1.05) == GO
@@ -127,10 +123,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """After a letter, such as S (start), that is sent during a drive, the command is sent again.
+    """After a letter, such as S (start), during a drive, the command is sent again.
 
-    Zeros precede the letter. If the board has received only the first part of a frame, the zeros
-    may complete it to a wrong command, which the repeated command replaces.
+    Zeros precede the letter, and may complete a broken frame to a wrong command. The repeated
+    command replaces the wrong one.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -195,10 +191,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """The command of one topic expires, so the driver sends Stop.
-
-    Later, another topic commands the robot. The driver sends the new command at once. It does not
-    send Stop a second time.
+    """After a command has expired, another topic's command is sent at once, without a second Stop.
     """
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
@@ -256,10 +249,9 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """Commands, stops, e-stops and releases come in random order.
+    """In any order of commands, stops, e-stops and releases, only fresh commands are sent.
 
-    The driver sends only commands that are younger than the timeout. During an e-stop, it sends no
-    commands. Between the commands of two topics, the driver always sends a Stop.
+    No commands are sent during an e-stop, and a Stop lies between the commands of two topics.
     """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""

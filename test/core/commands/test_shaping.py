@@ -17,9 +17,9 @@ def bench() -> Bench:
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
-    """A twist is commanded. The driver sends its frame before the call returns.
+    """The frame of a commanded twist is sent before the call returns.
 
-    The frame is computed by hand: 0.3 m/s is 21 LSB, −0.2 m/s is −14 LSB, 0.5 rad/s is 250 LSB.
+    Computed by hand: 0.3 m/s is 21 LSB, −0.2 m/s is −14 LSB, 0.5 rad/s is 250 LSB.
     """
     start = len(bench.written)
     bench.drive(0.3, -0.2, 0.5)
@@ -27,7 +27,7 @@ def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
 
 
 def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
-    """Wheel rates are commanded. The frame has rim speeds: 10 rad/s at 29 mm radius is 20 LSB.
+    """Wheel rates are sent as rim speeds: 10 rad/s at 29 mm radius is 20 LSB.
 
     If a wheel exceeds its limit, all wheels are scaled by the same factor.
     """
@@ -43,10 +43,10 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """A zero twist is commanded. The driver sends the Stop frame, not a velocity frame with zeros.
+    """A zero twist is sent as the Stop frame.
 
-    Velocities and goals have the same mode, 1. So the board could take a velocity frame with zeros
-    for a goal at the origin.
+    The board could take a velocity frame with zeros for a goal at the origin: the mode, 1, is the
+    same.
     """
     bench.drive(0.3)
     start = len(bench.written)

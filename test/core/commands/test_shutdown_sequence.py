@@ -36,10 +36,7 @@ def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """At shutdown, a pause is under way: P was sent, but the board has not confirmed it yet.
-
-    The driver sends no second P, because a second P would resume the board.
-    """
+    """A shutdown during an unconfirmed pause sends no second P, which would resume the board."""
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -85,10 +82,9 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """At shutdown, the robot has stopped. The driver checks once more that it stays at rest.
+    """At shutdown, the driver checks in silence that the robot stays at rest.
 
-    During this check, the driver writes nothing, because a bad line could turn any frame into a
-    motion.
+    It writes nothing during the check, because a bad line could turn any frame into a motion.
     """
     bench = driving()
     left(bench)
@@ -116,10 +112,9 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """A paused board sends no displacements, so it cannot prove that the robot is at rest.
+    """At shutdown, the driver waits for no proof that a paused robot is at rest.
 
-    But its motors are off, so the driver assumes that the robot is at rest. At shutdown, it does
-    not wait for a proof.
+    A paused board sends no displacements, but its motors are off.
     """
     bench = paused()
     left(bench)

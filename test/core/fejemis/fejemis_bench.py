@@ -32,9 +32,7 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 class Bench:
     """A session with both simulated boards.
 
-    ``hears``: channels on which bytes from the driver reach the robot.
-
-    ``speaks``: channels on which bytes from the robot reach the driver.
+    ``hears``: channels on which bytes from the driver reach the robot. ``speaks``: the reverse.
 
     ``read_s``: time in s between two reads of the driver.
     """

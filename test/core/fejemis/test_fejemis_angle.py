@@ -77,11 +77,9 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """A late driver does not blame the front board before it has read the front board's port.
+    """After a pause of 80 ms, the driver blames the front board only when it has read its port.
 
-    The driver does nothing for 80 ms, and then reads its two ports, one after the other. If the
-    front board's port is the second one, a command between the two reads is refused, and the
-    refusal names the computer.
+    Until then, the refusal of a command names the computer.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}
@@ -102,8 +100,8 @@ def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
 def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
     """A late read does not hide that the front board is silent.
 
-    The front board falls silent while the driver reads late. The refusal of a command then names
-    the computer. As soon as the driver reads in time again, the refusal names the front board.
+    A refusal names the computer while the reads are late, and the front board as soon as they are
+    in time.
     """
     bench = nominal()
     bench.run(0.1)

@@ -34,8 +34,8 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 def test_every_angle_is_told_within_half_a_degree() -> None:
     """Every relayed angle is right within 0.5°.
 
-    Usually, the driver rounds an angle to 0.1° and writes it as text. If the line's checksum would
-    miss some damage of this text, the driver writes a safer angle that is at most 0.5° away.
+    An angle is usually rounded to 0.1°. If the checksum would miss some damage, the driver writes a
+    safer angle nearby.
     """
     told = [float(relayed(angle_deg)[4:]) for angle_deg in EVERY]
     assert max(map(abs, told)) == 90.0
@@ -46,10 +46,9 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Two characters of an angle's text are lost. Usually the checksum detects this.
+    """The checksum detects the loss of two characters of an angle, except for some angles with a 6.
 
-    The checksum can miss the loss only if the angle is to the right, and its text contains a 6.
-    Then the board reads a wrong angle, which is always 0° to 10° to the left.
+    These angles are to the right. Then the board reads a wrong angle of 0° to 10° to the left.
     """
     across = 0
     for angle_deg in EVERY:
@@ -66,9 +65,9 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """One or two characters are lost from a line with an angle and a checksum.
+    """From an angle with a checksum that lost one or two characters, no different angle is read.
 
-    The board never reads a different angle, even if it parses lines in the most tolerant way.
+    This is true even for a board that parses lines in the most tolerant way.
     """
     text = relayed(angle_deg)
     data = line(text, sums=True)
@@ -78,10 +77,9 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """However an angle from −60° to −69° is written, its text contains ``-`` and ``6``.
+    """The text of an angle from −60° to −69° contains ``-`` and ``6``, in whatever form.
 
-    Their codes add up to 99, and the checksum is a sum modulo 99. So the checksum does not
-    change if both characters are lost, and another text for the same angle would not help.
+    Their codes add up to 99, and the checksum is a sum modulo 99, so it misses the loss of both.
     """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
@@ -107,10 +105,9 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """The board reads no angle beyond 90°, even from a damaged line without a checksum.
+    """From a line without a checksum that lost up to three characters, no angle beyond 90° is read.
 
-    Up to three characters of the line are lost. The claim is important, because beyond 90° the
-    inner wheel would be faster than the outer one.
+    Beyond 90°, the inner wheel would be faster than the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
@@ -127,14 +124,13 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """The board reads no angle beyond 90°, for any sequence of angles.
+    """For any sequence of angles, the board reads no angle beyond 90°.
 
-    The driver adds the rounding error of each angle to the next angle. Nevertheless, no angle in
-    its lines exceeds 90°.
+    The driver adds the rounding error of each angle to the next one. The limit also holds after a
+    loss:
 
-    The limit of 90° also holds for damaged lines. From a line with a checksum, the test removes any
-    two characters whose loss the checksum does not detect. From a line without a checksum, it
-    removes any one character.
+    * With a checksum: of any two characters whose loss the checksum does not detect.
+    * Without a checksum: of any one character.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):
@@ -146,10 +142,9 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 
 
 def test_rounding_errors_near_90_degrees_are_not_lost() -> None:
-    """The wheel stays near 90°. No relayed angle exceeds 90°, but the mean of the angles is right.
+    """Near 90°, no relayed angle exceeds 90°, and the mean of the angles is right.
 
-    If the rounding error of one angle cannot be added to the next angle, it is added to a later
-    one.
+    A rounding error that cannot be added to the next angle is added to a later one.
     """
     relay = AngleRelay()
     told = [float(relay.text(math.radians(89.7), sums=False)[4:]) for _ in range(200)]

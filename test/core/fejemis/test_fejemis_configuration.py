@@ -160,10 +160,9 @@ def test_a_small_change_by_the_user_is_written() -> None:
 
 @pytest.mark.slow
 def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
-    """The user changes a radius by 0.3 mm. The text line that writes it is damaged on its way.
+    """A line that changes a radius by 0.3 mm and is damaged on its way is written again.
 
-    The board then reports the old radius, with four decimals. Four decimals are enough to show that
-    the board does not have the new radius, so the driver writes it again.
+    The four decimals of the radius that the board reports show that the change is missing.
     """
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
@@ -281,8 +280,7 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """Motion is refused until the board has all settings that the user has set.
 
-    A text line that writes a setting is lost. While the robot is driven, the driver does not repeat
-    this line. So if motion were not refused, the robot could be driven without the setting.
+    The driver does not repeat the lost line of a setting while the robot is driven.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

@@ -76,10 +76,10 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
     ("channel", "text"), [(FRONT, b"sub fwl 100"), (DRIVE, b"sub pose 200"), (DRIVE, b"sub pose 0")]
 )
 def test_a_slower_subscription_of_another_program_is_replaced(channel: int, text: bytes) -> None:
-    """Another program subscribes to a stream that driving requires, with a longer period.
+    """The driver replaces another program's slower subscription to a stream that driving requires.
 
-    Regression: with an angle every 100 ms, the driver refused all motion until a reconnect. With a
-    pose every 200 ms, the odometry stayed that slow.
+    Regression: an angle every 100 ms blocked all motion until a reconnect, and a pose every 200 ms
+    slowed the odometry.
     """
     bench = nominal()
     bench.robot.receive(with_sum(text) + b"\n", bench.now, channel)

@@ -44,9 +44,9 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """The front wheel turns to one side. On the way, it gets an angle on the other side.
+    """A front wheel that must turn back half way to its angle causes no fault.
 
-    It turns back at once and comes nearer to the new angle, so no fault is reported.
+    It turns back at once and comes nearer to the new angle.
     """
     follower = Follower()
     follower.aim(1.5)
@@ -71,8 +71,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
     """After a fault of the front wheel, motion is refused until the wheel has moved.
 
-    Otherwise, each new command would move the robot for 1 s. The driver needs this time to notice
-    the blocked wheel again.
+    Otherwise, each new command would move the robot for 1 s, until the fault is noticed again.
     """
     follower = Follower()
     at = blocked(follower, 0.0)
@@ -118,8 +117,8 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The driver stops a robot whose firmware limits the front wheel to 90° in reverse.
 
-    Such a robot turns instead of reversing. A notice names ``allow_reverse``. The sender repeats
-    its command, so the driver stops the robot a second time. Motion is then refused until ~/start.
+    Such a robot turns instead of reversing. A notice names ``allow_reverse``. After the second
+    stop, motion is refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
@@ -164,10 +163,9 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 @pytest.mark.slow
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """Because of a fault, motion is refused until the user calls ~/start. The driver reconnects.
+    """Motion that a fault forbids until ~/start is still refused after a reconnect.
 
-    After the reconnect, the driver itself starts the board. Motion is still refused until the user
-    calls ~/start.
+    The driver's own start of the board does not permit the motion.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

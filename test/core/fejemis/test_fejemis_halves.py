@@ -215,9 +215,8 @@ def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
 ) -> None:
     """If the two boards do not form a pair, the driver soon repeats Stop less often.
 
-    One board is silent, or both are drive boards. The driver repeats Stop for up to 5 s.
-    Afterwards, it tries to start the boards twice a second, and sends one Stop with each try. While
-    the e-stop is latched, it sends Stop 20 times a second.
+    One board is silent, or both are drive boards. After at most 5 s, Stop comes only with each try
+    to start the boards, twice a second; during an e-stop, 20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks
@@ -295,10 +294,9 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The front board's clock is ahead of the drive board's clock by ``ahead_s``, in s.
+    """After the boards have exchanged ports, the drive board's stamps still use its own clock.
 
-    The boards exchange ports. Nevertheless, the driver does not use the front board's clock for the
-    stamps of the drive board.
+    The front board's clock is ahead of the drive board's clock by ``ahead_s``, in s.
     """
     bench = Bench()
     bench.robot.front._restart(ahead_s)

@@ -47,8 +47,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: all other lines come only with every second sample. If ``odd`` is True, these are the
-    samples with odd numbers. If it is False, they are those with even numbers.
+    ``odd``: the other lines come only with samples of odd numbers (True) or of even numbers
+    (False).
     """
 
     order: str
@@ -124,7 +124,7 @@ def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[flo
 
 
 def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -> list[Read]:
-    """Divide the lines into the reads of a fast host, which is busy at times for up to 0.15 s.
+    """Divide the lines into the reads of a fast host that is busy at times, for up to 0.15 s.
 
     ``stalls``: probability that the host is busy before it reads a line.
     """
@@ -280,14 +280,13 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lines are lost, arrive twice or arrive late. Only one kind of pair has lines of two samples.
+    """Lost, repeated and late lines are paired with lines of another sample only in one case.
 
-    In such a pair, one line is read late, the other line is read less than 5 ms later, and no pose
-    follows in the same read. Then nothing in the stream shows that the lines belong to different
-    samples.
+    In this case, one line is read late, the other one less than 5 ms later, and no pose follows in
+    the same read. The stream does not show the mistake.
 
-    ``period_s``: period of the reads in s; None if each line is read at once. It is not the period
-    of the samples: such reads would hide which line of a sample comes first.
+    ``period_s``: period of the reads in s; None if each line is read at once. Reads with the period
+    of the samples would hide which line of a sample comes first.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -300,10 +299,9 @@ def test_no_pair_has_lines_of_two_samples(
 @pytest.mark.slow
 @pytest.mark.parametrize("silence_s", [0.3, 2.0])
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
-    """The drive board is silent for a while, and then sends samples and poses again.
+    """No sample after a silence of the drive board gets a stamp from before the silence.
 
-    If a sample comes before the first pose, its time is unknown. The driver does not publish such a
-    sample, so no sample gets a stamp from before the silence.
+    The driver does not publish a sample before the first pose, because its time is unknown.
     """
     bench = nominal()
     for phase_s in (0.0, 0.005, 0.01, 0.015):
@@ -320,10 +318,9 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 
 @pytest.mark.slow
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
-    """The host reads every 0.2 s. Each read begins with samples, before its first pose.
+    """The samples at the beginning of a late read are published.
 
-    These samples wait for that pose, which shows that the board was not silent. Then the driver
-    publishes the samples, too.
+    They wait for the first pose of the read, which shows that the board was not silent.
     """
     bench = nominal()
     bench.run(3.0)

@@ -34,10 +34,10 @@ def sampled(arrivals: list[float]) -> list[float]:
 
 
 def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken() -> None:
-    """The host does not read for 6 s, and all samples of this time arrive together.
+    """Samples that waited for 6 s get their sampling times.
 
-    The newest samples of a few seconds usually show the phase of the sampling times. But all
-    samples that waited are late, so the phase must stay.
+    The newest samples usually show the phase of the sampling times. Here all of them are late, so
+    the phase must stay.
     """
     arrivals = [
         11.0 if 5.0 < 0.01 * number < 11.0 else 0.01 * number + 3e-4 for number in range(1500)
@@ -47,10 +47,10 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 
 
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
-    """Two successive samples are 17 ms late, and the next one is 7 ms late. No sample is lost.
+    """Two late samples do not shift the sampling times of the next ones.
 
-    After the second sample, it seems as if one sample was lost. The third sample would then be
-    3 ms early, and that is impossible. So it shows that no sample was lost.
+    The second one seems to follow a lost sample. The third one would then be 3 ms early, which is
+    impossible, so no sample was lost.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}
     arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]
@@ -59,10 +59,10 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 
 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
-    """Samples are up to 30 ms late, and 10 % of the samples and poses are lost.
+    """A sample that seems early cancels only the last of several supposed losses.
 
-    Many samples are lost before one is on time again. If this one is early, only the last loss was
-    a mistake. Otherwise the stamps would be several periods too old.
+    Otherwise the stamps would be several periods too old. Samples are up to 30 ms late, and 10 % of
+    samples and poses are lost.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []
@@ -139,9 +139,9 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 
 
 def numbered() -> Bench:
-    """Return a bench on which each gyro or acceleration line shows when the board wrote it.
+    """Return a bench on which each gyro or acceleration line shows the board's cycle.
 
-    The board counts its cycles. The x value of a line is the number of the cycle, divided by 1000.
+    The x value of a line is the number of the cycle, divided by 1000.
     """
     bench = nominal()
     drive = bench.robot.drive
@@ -153,10 +153,9 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return a pair for each published sample: the cycles of its gyro and its acceleration line.
+    """Return, for each published sample, the cycles of its gyro line and its acceleration line.
 
-    A cycle is a period of the board. The lines of a bench from ``numbered`` contain the number of
-    the cycle, divided by 1000. The pairs contain the same values.
+    Each is the number of the cycle divided by 1000, from the lines of a bench from ``numbered``.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
@@ -169,8 +168,7 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
     """The two lines of each published sample come from the same cycle of the board.
 
-    The driver reads every 100 ms, so each read has ten samples. In the case "lost", 1 % of the
-    lines is lost. In the case "twice", 1 % of the lines comes twice.
+    Each read has ten samples. In the cases "lost" and "twice", this happens to 1 % of the lines.
     """
     bench = numbered()
     chance = random.Random(5)

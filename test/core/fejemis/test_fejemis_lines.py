@@ -179,9 +179,9 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line has lost its end, so it is joined to the next line. Both are discarded, as one fault.
+    """A line that lost its end is discarded with the next line, as one fault.
 
-    The line after these two is decoded. A line with a wrong checksum is counted as a fault, too.
+    The line after these two is decoded. A line with a wrong checksum is a fault, too.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
@@ -224,8 +224,7 @@ def test_the_limit_of_a_line_does_not_depend_on_the_chunking(
 ) -> None:
     """Lines of about 200 characters are decoded in the same way in whatever pieces they arrive.
 
-    Even the line end may arrive in another piece than the line. The decoder returns the same
-    messages and counts as if all bytes arrived in one piece.
+    The messages and counts are the same as for one piece, even if a line end arrives separately.
     """
     stream = b"\n".join(lines)
     whole, split = FejemisDecoder(), FejemisDecoder()
@@ -263,8 +262,7 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
     """The first heartbeat shows whether the board's lines have checksums.
 
-    If it has a checksum, the decoder then discards lines without one. If it has none, the decoder
-    discards lines with one.
+    The decoder then discards lines that differ from the heartbeat in this.
     """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
@@ -320,9 +318,8 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
     """The decoder soon accepts lines that the firmware prints with other decimals than before.
 
-    Lines of one kind begin to arrive with fewer decimals. The decoder discards the first two as
-    damaged, and accepts the third and all later ones. If the decimals of a kind of line vary all
-    the time, the decoder accepts lines of this kind with any number of decimals.
+    It discards the first two as damaged. If the decimals of a kind of line vary all the time, any
+    number of decimals is accepted.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
@@ -336,9 +333,8 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
     """Lines with another form than the learnt one are counted in windows of 24 lines of a kind.
 
-    The decoder discards them as damaged. When a window has 8 such lines, the decoder no longer
-    checks the form of this kind of line. Here, one window ends with 7 such lines, and the next one
-    begins with 7. All 14 are discarded. Only the 8th one of the second window is accepted.
+    The decoder discards such lines until a window has 8 of them, and then accepts every form. Here,
+    7 at the end of one window and 7 in the next are discarded; the 8th is accepted.
 
     ``windows``: number of earlier windows without such lines.
     """

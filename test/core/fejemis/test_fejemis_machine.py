@@ -46,10 +46,9 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """If a thousand lift voltages or colours are commanded within 1 s, only about twenty are sent.
+    """Of a thousand lift voltages or colours within 1 s, only about twenty are sent.
 
-    Each time, the newest one is sent, and the older ones are discarded. A voltage of 0 is sent at
-    once.
+    Each time, the newest one is sent. A voltage of 0 is sent at once.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -72,8 +71,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
     """The time limit of a lift voltage begins when the voltage is sent, not when it is commanded.
 
-    The voltage must wait if another voltage was just sent. If the lift is switched off meanwhile,
-    the driver discards the waiting voltage.
+    A voltage waits if another one was just sent. Switching the lift off discards it.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
@@ -92,11 +90,9 @@ def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
 
 
 def test_a_new_lift_voltage_is_not_cancelled_by_the_repeated_switching_off() -> None:
-    """After a new lift voltage, the driver does not repeat the earlier line that stops the lift.
+    """A new lift voltage ends the repetition of the line that switches the lift off.
 
-    Lift and brush are switched off, then a new lift voltage is commanded. The driver usually sends
-    each of the two lines three times. Here it still repeats the brush's line, but not the lift's: a
-    repeated lift line would cancel the new voltage.
+    A repeated line would cancel the new voltage. The brush's line is still sent three times.
     """
     machine = Machine()
     machine.off()
@@ -188,8 +184,8 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
     """The last lines of the guard and of the driver stop wheels, brush and lift.
 
-    The guard's lines do this with and without a latched e-stop. The driver's lines are those that
-    it sends at its exit.
+    The guard's lines do so with and without a latched e-stop; the driver's lines are those at its
+    exit.
     """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()

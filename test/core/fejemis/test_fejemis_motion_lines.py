@@ -29,8 +29,8 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
     """Return the numbers of each command that a board with checksums reads from the bytes.
 
-    The board is as lenient as possible: numbers are read as in C, missing numbers are 0, and a
-    checksum may have one digit.
+    The board is lenient: numbers are read as in C, missing numbers are 0, and a checksum may have
+    one digit.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -69,10 +69,9 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 
 @pytest.mark.slow
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """A line loses one or two characters. The board reads no wrong motion.
+    """From a line that lost one or two characters, the board reads no wrong motion.
 
-    The test also sends a second line, because the board reads both lines as one if the line end is
-    lost.
+    A second line follows: without the line end, the board reads both as one line.
     """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
@@ -147,9 +146,9 @@ def test_what_three_lost_characters_leave() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """In the front board's line, the angle is right within 0.02°, and small angles within 1 %.
+    """The angle in the front board's line is right within 0.02°, and a small angle within 1 %.
 
-    In the drive board's line, the speed of the outer wheel is right within 0.6 %.
+    The speed of the outer wheel in the drive board's line is right within 0.6 %.
     """
     if v == w == 0.0:
         return
@@ -167,7 +166,7 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     """The outer wheel reaches every speed within 1.8 %, although the lines avoid certain digits.
 
-    Negative speeds are the least exact, because a line with a minus sign also avoids the digit 6.
+    Negative speeds are the least exact: beside a minus sign, the digit 6 is avoided too.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.12**n for n in range(60))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -178,10 +177,9 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     "volts", [6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25, 1.99, 1.999, -0.1995, -0.1999]
 )
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """A lift line commands 45 to 100 % of the requested voltage, and may lose characters.
+    """A lift line that lost one or two characters drives the lift no harder and no longer.
 
-    The lift then gets at most the voltage in the undamaged line, in the same direction. It runs no
-    longer than the undamaged line says.
+    The line commands 45 to 100 % of the requested voltage. The direction stays the same.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -212,9 +210,9 @@ def test_every_lift_voltage_has_a_robust_line(
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """The driver adds nothing to a line: it has only its text, its checksum and the line end.
+    """A line has only its text, its checksum and the line end.
 
-    The reason is a related firmware, which obeys ``stop`` only if the line contains nothing else.
+    A related firmware obeys ``stop`` only if the line contains nothing else.
     """
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
@@ -227,11 +225,14 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 @pytest.mark.slow
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """A motion line without a checksum loses one character.
+    """Without a checksum, only the loss of a point or a digit makes the outer wheel faster.
 
-    The outer wheel becomes faster only if this character is the decimal point or a digit of the
-    speed. It changes its direction only if this character is the minus sign. The test tries speeds
-    below 1.1 m/s in steps of 1 mm/s, and from 3 to 20 m/s in steps of 1 m/s.
+    Only the loss of the minus sign reverses the wheel. One character of the line is lost.
+    :
+    No false motion is read if a stop line, ``rc 2 0 0``, and the next line lose two characters.
+
+    An empty line between them prevents ``rc 2 0 092``: the 92 would be the next line's checksum,
+    without the line end and the semicolon before it.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):
@@ -257,7 +258,7 @@ def test_without_sums_the_drive_board_gets_the_speed_of_the_outer_wheel() -> Non
 def test_without_sums_a_whole_speed_keeps_its_decimal_point() -> None:
     """The speed 1 m/s is written as ``1.``, so the line is ``rc 2 1. 0``.
 
-    If the line loses its last space, the board reads the speed as ``1.0``, which is the same speed.
+    Without its last space, the line has the same speed, ``1.0``.
     """
     assert plain_drive_line(1.0, 0.0) == b"rc 2 1. 0"
     assert plain(b"rc 2 1.0\n") == [(2.0, 1.0, 0.0)]

@@ -79,9 +79,9 @@ def test_displacements_add_up_to_the_pose() -> None:
 
 
 def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
-    """The robot drives at a constant speed. The speed in the odometry varies by less than 4 mm/s.
+    """At a constant speed, the speed in the odometry varies by less than 4 mm/s.
 
-    Poses alone have steps of 1 mm, so they would give speeds in steps of 0.05 m/s.
+    From poses alone, it would have steps of 0.05 m/s.
     """
     spread = {}
     for with_speeds in (True, False):
@@ -167,10 +167,10 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
 def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
     seconds: float, v: float, w: float
 ) -> None:
-    """If another program sends ``enc0`` during a drive, ``odom`` keeps the way that was driven.
+    """If another program sends ``enc0`` during a drive, ``odom`` does not jump.
 
-    Regression: a robot could have driven back to the new origin, if it was near enough. Then the
-    odometry went back by the whole way, with a standard deviation of a few millimetres.
+    Regression: near the old origin, the odometry went back by the whole distance, with a standard
+    deviation of a few millimetres.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.0)
@@ -207,10 +207,10 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
 
 @pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
-    """On a slow computer the driver reads every 0.15 s, and another program sends ``enc0``.
+    """With reads every 0.15 s, ``odom`` does not jump if another program sends ``enc0``.
 
-    Regression: the driver measured the age of wheel speeds by their time of arrival. So it had no
-    wheel speeds for the first pose of a read, and ``odom`` went back by the way driven.
+    Regression: the age of wheel speeds was measured by their arrival, so the first pose of a read
+    had none.
     """
     bench = nominal()
     bench.drive_on(0.5, 0.3, 0.6)
@@ -255,8 +255,7 @@ def test_a_pose_with_coarse_digits_is_no_new_frame() -> None:
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
     """The normalised squared error (NEES) of the odometry is about 3 on average over fifty drives.
 
-    In each drive, slip and wheel sizes have random errors. The noise settings are the standard
-    deviations of these errors, and the odometry computes its covariance from the same settings.
+    The random errors of slip and wheel sizes have the standard deviations of the noise settings.
     """
     noise = OdometryNoise(wheels=WHEELS)
     squares = []

@@ -31,7 +31,7 @@ class Row:
 
     ``use``: the topic, service, parameter or diagnostic key that needs the command.
 
-    ``by``: what the driver does instead of sending the command; empty if it sends the command.
+    ``by``: what the driver does instead; empty if it sends the command.
     """
 
     golden: str
@@ -194,7 +194,7 @@ def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
 def said_by_the_driver() -> set[str]:
     """Return all lines that the driver sends in a session in which a user requests everything.
 
-    The result also contains two example lines: one of a relayed angle, and one of a lift voltage.
+    Example lines of a relayed angle and of a lift voltage are added.
     """
     written: dict[Written, tuple[float, ...]] = {
         Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),
@@ -228,11 +228,10 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """The driver sends each command of the table as in the table's example line, or never.
+    """The driver sends each command of the table as in its example line, or never.
 
-    A user requests everything that the driver offers. Only the numbers of ``motv`` may differ from
-    the example line. The driver never sends the commands that the table marks as unused or
-    replaced, such as ``setid``, which can erase the board.
+    Only the numbers of ``motv`` may differ. Commands that the table marks as unused or replaced,
+    such as ``setid``, which can erase the board, are never sent.
     """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden

@@ -40,10 +40,9 @@ def assert_still_refused(bench: Bench) -> None:
 
 
 def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
-    """A power off is pending, and the e-stop is latched. Then the user calls ~/start.
+    """A ~/start during an e-stop cancels a pending power off.
 
-    The driver sends ``on``, but not ``start``. The line ``on`` cancels the power off, so the power
-    stays on.
+    The driver sends ``on``, which cancels the power off, but not ``start``.
     """
     bench.estop(True)
     bench.session.request(Request.START, None, bench.now)
@@ -54,12 +53,9 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 @pytest.mark.parametrize("closes", [False, True])
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
-    """The boards fall silent during a power off. Then the user calls ~/start.
+    """A ~/start makes a pending power off of silent boards fail, but is not confirmed itself.
 
-    This call ends the power off, which the driver reports as failed. The driver does not confirm
-    ~/start, because the boards have sent nothing since the call.
-
-    ``closes``: whether the ports close right after the call.
+    The boards have sent nothing since the call. ``closes``: whether the ports close right after it.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -94,10 +90,9 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 
 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
-    """The user calls ~/start, and then ~/power_off.
+    """A ~/start does not cancel a later ~/power_off.
 
-    The driver repeats the line ``on`` after ~/start. This line would cancel the power off, so the
-    driver stops repeating it when the user calls ~/power_off.
+    The driver stops repeating the line ``on`` of ~/start, which would cancel the power off.
     """
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -161,10 +156,10 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_other_order(
     bench: Bench,
 ) -> None:
-    """Both boards restart while not connected. Afterwards, each board is at the other board's port.
+    """A power off is forgotten if both boards restart unseen and come back at exchanged ports.
 
-    The driver compares the time of each board with the earlier time of the same board, at whatever
-    port it is. So the driver notices both restarts, and accepts motion.
+    The driver compares the time of each board with its earlier time at any port, so it notices both
+    restarts.
     """
     bench.close()
     bench.speaks = set()
@@ -281,9 +276,9 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """If the command ``off 300`` loses its 3 and one 0, its checksum still fits.
+    """The delay of a power off is such that the checksum detects the loss of any two digits.
 
-    The robot would then wait less than the user wants. So the driver sends a longer delay, in which
-    the checksum detects the loss of any two digits.
+    For example, ``off 300`` without its 3 and one 0 would have a fitting checksum and a shorter
+    delay.
     """
     assert whole_seconds(wanted_s) == seconds

@@ -2,8 +2,7 @@
 
 """Tests of boards that restart: short and long boots, with or without the start line.
 
-A start line is the line that a board sends at the end of its boot. The host reads at several
-intervals.
+A board sends the start line at the end of its boot. The host reads at several intervals.
 """
 
 import contextlib
@@ -61,10 +60,9 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 @pytest.mark.slow
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """The driver reads every 20 ms. The drive board restarts at different times between two reads.
+    """The odometry does not jump if the drive board restarts at any time between two reads.
 
-    So a read may contain poses from before and from after the restart. Nevertheless, the odometry
-    does not jump.
+    A read of 20 ms may contain poses from before and from after the restart.
     """
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
@@ -88,11 +86,10 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A board restarts during a slow drive. The driver reports the restart and stops the robot.
+    """A restart of a board during a slow drive is reported and stops the robot.
 
-    The driver stops the robot although the last command is still valid. Some boards send a line
-    that reports the restart. If a board sends no such line, the driver detects the restart from the
-    times in the board's other lines.
+    The last command is still valid. Without the line that reports a restart, the driver detects the
+    restart from the times in the board's other lines.
     """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
@@ -118,11 +115,9 @@ def test_every_restart_stops_the_robot_and_is_reported(
 def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grown(
     away_s: float,
 ) -> None:
-    """The drive board restarts while its port is away. Its pose begins at zero again.
+    """A restart while the port is away is detected, and the odometry does not jump.
 
-    The port comes back ``away_s`` seconds after the restart. The board's uptime may then be shorter
-    or longer than before the restart. In both cases, the driver detects the restart, so the
-    odometry does not jump.
+    The board's uptime may be shorter or longer than before the restart, after ``away_s`` seconds.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -143,11 +138,10 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 
 @pytest.mark.slow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
-    """The drive board's port is away. During this time, the board restarts and the computer stalls.
+    """A restart while the port is away is detected despite a stall, and the odometry does not jump.
 
-    After the restart, the board's time is small, so the lines of the new connection seem late. The
-    stall does not explain this, because it ended before the port was back. The driver detects the
-    restart, and the odometry does not jump.
+    The board's small time after the restart looks like late lines. The stall does not explain them:
+    it ended before the port was back.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)
@@ -233,10 +227,9 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """A board was silent. Then a heartbeat arrives that the board sent before the silence.
+    """A heartbeat that the board sent before a silence does not prove that it has not restarted.
 
-    This heartbeat does not prove that the board has not restarted. Only a heartbeat that was sent
-    after the silence proves this.
+    Only a heartbeat that was sent after the silence proves this.
     """
     bench = nominal()
     bench.run(2.0)
@@ -277,8 +270,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
     """After a board was silent, the driver requests its heartbeat ten times a second.
 
-    Without a request, heartbeats come only every 0.4 s. With the requests, the driver learns
-    earlier whether the board has restarted.
+    Without requests, heartbeats come only every 0.4 s, and the driver learns late of a restart.
     """
     bench = nominal()
     bench.speaks = {DRIVE}
@@ -315,10 +307,9 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
-    """The computer stalls, so the driver does not know whether the boards have restarted.
+    """The driver accepts commands within 0.25 s after a stall of the computer.
 
-    Within 0.25 s after the stall, heartbeats show that no board has restarted. So the driver
-    accepts commands again.
+    Heartbeats have shown by then that no board has restarted.
     """
     bench = nominal()
     bench.run(2.0)

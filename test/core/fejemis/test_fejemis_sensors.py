@@ -67,9 +67,9 @@ def test_the_biases_are_subtracted_from_both_imu_topics() -> None:
 
 @pytest.mark.slow
 def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
-    """The port is lost while the robot turns at 1 rad/s, and opens after the robot has stopped.
+    """The first orientations after a reconnect have the turn rate of the robot, now at rest.
 
-    The next orientations have a turn rate of about zero, not of 1 rad/s.
+    Before the port was lost, the robot turned at 1 rad/s.
     """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)

@@ -76,10 +76,9 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """Every command to calibrate is lost, so the offsets stay unchanged. The user's request fails.
+    """A calibration that leaves the offsets unchanged fails, because its commands were lost.
 
-    Unchanged offsets show that there was no calibration. A real calibration always changes them a
-    little, because of sensor noise.
+    Sensor noise changes the offsets a little in every real calibration.
     """
     bench = nominal()
     lose(bench, word.encode(), 99)
@@ -316,10 +315,9 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """The user requests to load the configuration while the robot drives.
+    """A request to load the configuration during a drive first stops the robot.
 
-    The driver first stops the robot. It sends ``eer``, the command to load, only after the robot
-    has had time to stop.
+    ``eer``, the command to load, is sent only after the robot has had time to stop.
     """
     bench = nominal()
     bench.drive_on()
@@ -334,11 +332,10 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
-    """The driver is to load the configuration, and stops the robot first. Then it shuts down.
+    """A shutdown ends the job of loading with a failure that names the shutdown.
 
-    The job of loading fails, and its answer names the shutdown as the reason. Before the job, the
-    user changed a setting. The driver has not written this setting yet, and does not write it
-    during the shutdown. It only sends commands to stop, and the angles of the front wheel.
+    Then the driver sends only stop commands and angles of the front wheel. A setting that still
+    waits is not written.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

@@ -56,11 +56,10 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
     ],
 )
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
-    """The robot drives a curve while the driver stalls. The odometry contains this whole motion.
+    """The odometry contains the whole motion of a drive during a stall of the driver.
 
-    If the driver does not notice the stall, it rejects lines that are more than 1 s late. The first
-    displacement after the stall then also covers the time of these lines, so it covers seconds. The
-    next one covers 20 ms. The driver regards neither of the two as implausible.
+    After an unnoticed stall, lines that are more than 1 s late are rejected. The first displacement
+    then covers seconds, the next one 20 ms, and neither is implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -78,11 +77,9 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
 @pytest.mark.parametrize("stall_s", [0.8, 2.0])
 @pytest.mark.parametrize("room", [READ, EVERYTHING])
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
-    """The driver stalls, and the boards' lines wait in the terminal's buffer.
+    """After a stall, all samples in the terminal's buffer are published with their sampling times.
 
-    In one case, the buffer has room for the lines of 0.37 s only; in the other case, it has room
-    for all lines. Later, the driver publishes all samples that are in the buffer. Each sample has
-    the time at which the board took it.
+    The buffer has room for the lines of 0.37 s, or for all lines.
     """
     bench = nominal()
     bench.run(1.0)
@@ -98,10 +95,10 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
-    """The driver needs long for the first read after a stall, so the second read is late too.
+    """After a stall and a second late read, the published samples have their sampling times.
 
-    Bytes are lost between the two reads, which the next pose shows. A sample between the lost bytes
-    and this pose is not published. All other samples get the times at which the board took them.
+    Bytes are lost between the two reads. Only a sample between them and the next pose is not
+    published.
     """
     bench = nominal()
     bench.run(1.0)
@@ -119,10 +116,9 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """The driver stalls. The terminal's buffer becomes full, so later bytes are lost.
+    """No sample gets a stamp in the time in which the full terminal's buffer lost bytes.
 
-    After the stall, the reads follow each other without a pause. Still, no sample gets a stamp that
-    lies in the time in which bytes were lost.
+    After the stall, the reads follow each other without a pause.
     """
     bench = nominal()
     bench.run(1.0)

@@ -102,7 +102,7 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 ) -> None:
     """The body is not faster than commanded while the front wheel has not reached its angle.
 
-    A small excess is allowed: the effect of an error of 5° in the wheel's angle.
+    The tolerance is the effect of an error of 5° in the wheel's angle.
     """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
@@ -162,10 +162,9 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The robot obeys a command for 2.5 s. Then it has the commanded speed and turn rate.
+    """After 2.5 s, the robot has the commanded speed and turn rate.
 
-    The tolerance of the speed is 1.2 % of the outer wheel's speed. The tolerance of the turn rate
-    is 3 % of the outer wheel's speed divided by the track width.
+    Tolerances: 1.2 % of the outer wheel's speed, and 3 % of this speed divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -190,10 +189,9 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 
 
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
-    """A turn on the spot begins while the front wheel points ahead. The robot does not roll away.
+    """A robot whose front wheel points ahead does not roll away when a turn on the spot begins.
 
-    The driver waits until the front wheel has turned. Without this wait, the robot would roll
-    0.17 m.
+    Without the wait for the front wheel, it would roll 0.17 m.
     """
     bench = nominal()
     for _ in range(12):
@@ -205,9 +203,9 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 @pytest.mark.slow
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """A turn on the spot to the left is followed by one to the right.
+    """Between turns on the spot to the left and to the right, the robot is at rest.
 
-    The robot is at rest while the front wheel turns by 180°, which takes over 1 s.
+    Meanwhile the front wheel turns by 180°, for over 1 s.
     """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 1.5)
@@ -256,10 +254,9 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
     """A reverse command that the driver has set to zero is not driven later.
 
-    The motion monitor has stopped the robot twice. So motion is refused until ~/start, but a zero
-    command is still accepted. A node repeats the command -0.3 m/s. ``allow_reverse`` is off, so the
-    driver sets this command to zero, and accepts it. Then the user sets ``allow_reverse``. The
-    robot stays at rest. The node's next command is a motion, so it is refused.
+    It was accepted as a zero command while motion was refused until ~/start and ``allow_reverse``
+    was off. After the user sets ``allow_reverse``, the robot stays at rest, and the next reverse
+    command is refused.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

@@ -104,11 +104,10 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 
 
 def test_a_pause_survives_a_reconnect_and_the_release_of_an_estop() -> None:
-    """A pause continues after a reconnect and after the release of an e-stop.
+    """A pause continues after a reconnect and after the release of an e-stop, until ~/start.
 
-    The user pauses the robot while the e-stop is latched. Then the port of the front board is lost.
-    When the e-stop is released, the driver does not send the line ``start`` to the boards. Only the
-    user's ~/start ends the pause.
+    The pause was requested during the e-stop, and the front board's port was lost. The release does
+    not send the line ``start``.
     """
     bench = nominal()
     bench.estop(True)
@@ -140,10 +139,9 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 
 
 def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
-    """Both boards lose their power, and the ports stay open. The driver refuses motion commands.
+    """The refusal of motion without data says at first only that nothing was read from the boards.
 
-    At first, the driver cannot exclude that only its own reads are late. So the refusal says that
-    nothing was read. A few seconds later, the refusal says that the boards send no data.
+    A few seconds later, late reads are excluded, and it says that the boards send no data.
     """
     bench = nominal()
     bench.drive_on()
@@ -161,8 +159,8 @@ def assert_the_estop_is_the_answer_and_the_pause_continues(
 ) -> None:
     """Check that ``answer`` is a failure because of the e-stop, and that the pause continues.
 
-    The e-stop is released. After that, the robot must stay paused until the next ~/start. From the
-    time ``mark`` (in s) until this ~/start, the driver must not send the line ``start``.
+    After the release of the e-stop, the robot stays paused until the next ~/start. The driver sends
+    no line ``start`` in between, from the time ``mark`` (in s) on.
     """
     assert not answer.success
     assert "release it with ~/estop" in answer.message
@@ -174,10 +172,9 @@ def assert_the_estop_is_the_answer_and_the_pause_continues(
 
 
 def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() -> None:
-    """The robot is paused and the e-stop is latched when the user calls ~/start.
+    """A ~/start of a paused robot during an e-stop fails at once, and its answer names the e-stop.
 
-    The service fails, and its answer names the e-stop. After the release of the e-stop, the robot
-    stays paused until the next ~/start.
+    The robot stays paused until the next ~/start.
     """
     bench = nominal()
     assert bench.ask(Request.PAUSE).success
@@ -189,10 +186,9 @@ def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() 
 
 
 def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None:
-    """The robot is paused. The e-stop is latched before the drive board has confirmed ~/start.
+    """An e-stop makes a ~/start fail that the drive board has not yet confirmed.
 
-    So ~/start fails, and its answer names the e-stop. After the release of the e-stop, the robot
-    stays paused until the next ~/start.
+    The answer names the e-stop. The robot stays paused until the next ~/start.
     """
     bench = nominal()
     assert bench.ask(Request.PAUSE).success
@@ -209,8 +205,8 @@ def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None
 def test_a_start_of_a_driven_robot_interrupts_its_motion_only_for_a_moment() -> None:
     """A ~/start during a drive interrupts the motion only for a moment.
 
-    The driver sends Stop before ``start``, and the motion command right after it. The command does
-    not wait for its regular repetition, which comes only once a second here.
+    The driver sends Stop, ``start`` and the motion command at once. The regular repetition of the
+    command comes only once a second here.
     """
     bench = nominal(commands=CommandSettings(timeout_s=60.0, rate_hz=1.0))
     bench.drive()

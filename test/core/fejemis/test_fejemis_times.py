@@ -37,10 +37,9 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Lines arrive late, and some are lost. The stamps have only small errors.
+    """The stamps of late and lost lines have small errors, apart from a constant delay.
 
-    A constant delay of all stamps is not counted as an error. 99 % of the errors are below 0.05 ms
-    for poses, and below 0.2 ms for IMU samples.
+    99 % of the errors are below 0.05 ms for poses, and below 0.2 ms for IMU samples.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
@@ -95,8 +94,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
     """The clock notices that a board has restarted soon after its start.
 
-    Such a restart is hard to notice: the board's time falls by only 0.6 s, so the new lines look
-    almost like late lines.
+    The board's time falls by only 0.6 s, so the new lines look almost like late lines.
     """
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
@@ -110,13 +108,10 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 @pytest.mark.parametrize("waited_s", [0.012, 0.03, 0.2])
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
-    """The clock becomes right, although its first line was read late.
+    """A clock that began with a late line becomes right, and rejects at most three lines meanwhile.
 
-    At first, the clock takes the delay of this line for the usual delay. Later lines that are read
-    with less delay seem to arrive too early. The clock rejects the times of at most three lines,
-    and then it is right.
-
-    Each later read brings two lines, which were sent 20 ms apart.
+    Lines with less delay seem too early at first. Each later read brings two lines, sent 20 ms
+    apart.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -130,10 +125,10 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 
 
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
-    """Every third time from the board is damaged: it is 0.1 s too large.
+    """Damaged times that are 0.1 s too large, every third time, do not move the clock.
 
-    The damaged times agree with each other, so they could be the times after a jump. But a correct,
-    smaller time follows each damaged time. So the clock rejects the damaged times, and stays right.
+    They agree with each other, but a correct, smaller time follows each of them, so they are no
+    jump.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -146,10 +141,9 @@ def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_rare_reads_lose_no_odometry(seed: int) -> None:
-    """The driver reads each port only every 50 ms, so each read brings two or three poses.
+    """No odometry and no IMU sample is lost if the driver reads each port only every 50 ms.
 
-    No odometry and no IMU sample is lost. ``seed`` varies how long the robot runs before the driver
-    connects, and when the driver first reads each port.
+    ``seed`` varies how long the robot runs before the driver connects, and the phase of the reads.
     """
     bench, chance = Bench(), random.Random(seed)
     for _ in range(chance.randrange(2000)):
@@ -167,9 +161,9 @@ def test_rare_reads_lose_no_odometry(seed: int) -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """The driver makes sure that each stamp is later than the previous stamp of the same kind.
+    """Each stamp is later than the previous one of its kind, and not in the future.
 
-    It also changes a stamp that is in the future: it sets the stamp to the present time.
+    A stamp in the future is set to the present time.
     """
     stamped = StampedReadings()
     stamped.begin()
@@ -182,11 +176,10 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """Stamps must increase only among extra readings of the same kind.
+    """Stamps of extra readings must increase only within a kind.
 
-    The second reading has an earlier stamp than the first one. It is of another kind, so the driver
-    does not change its stamp. The third reading has the kind and the stamp of the first one, so the
-    driver makes its stamp later.
+    The earlier stamp of the second reading, of another kind, stays. The third reading has the kind
+    and the stamp of the first, so its stamp is made later.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -195,10 +188,9 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """The first lines are old: they waited before the port was opened.
+    """Old lines that waited before the port was opened are not regarded as a restart.
 
-    After the old lines, the board's time jumps ahead. The clock follows the jump. It does not
-    report a restart of the board, because a restart would set the board's time back.
+    The clock follows the jump of the board's time after them. A restart would set the time back.
     """
     clock = TeensyClock()
     for n in range(20):
@@ -213,10 +205,9 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
-    """The host stalls. After the stall, many lines of the board arrive at once.
+    """Many lines that arrive at once after a stall of the host are not regarded as a restart.
 
-    The board's times in these lines increase, as they did before. So the clock does not report a
-    restart.
+    The times in these lines increase, as before.
     """
     clock = TeensyClock()
     for n in range(100):

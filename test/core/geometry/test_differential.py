@@ -30,19 +30,17 @@ def test_straight_ahead_both_wheels_roll_alike() -> None:
 
 
 def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
-    """The robot turns left on the spot at 1 rad/s.
+    """In a left turn on the spot at 1 rad/s, the wheels turn at -2 and 2 rad/s.
 
-    Each wheel is 0.2 m from the centre and has a radius of 0.1 m. The left wheel turns at -2 rad/s,
-    the right wheel at 2 rad/s.
+    Each wheel is 0.2 m from the centre and has a radius of 0.1 m.
     """
     assert ROBOT.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == pytest.approx((-2.0, 2.0))
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """The robot turns left at 0.5 rad/s about a point 1 m to its left, so it moves at 0.5 m/s.
+    """In a turn at 0.5 rad/s about a point 1 m to its left, the robot moves at 0.5 m/s.
 
-    The left wheel runs on a circle with a radius of 0.8 m at 0.4 m/s. The right wheel runs on a
-    circle with a radius of 1.2 m at 0.6 m/s.
+    The left wheel runs at 0.4 m/s on a radius of 0.8 m, the right wheel at 0.6 m/s on 1.2 m.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 

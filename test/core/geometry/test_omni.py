@@ -25,10 +25,9 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """The rim speeds of the manual's equations, divided by the wheel radius, are the wheel rates.
+    """The wheel rates are the rim speeds of the manual's equations, divided by the wheel radius.
 
-    In the manual, the rims of A and B move at ∓cos 30° Vx - sin 30° Vy - L Ω, and that of C at Vy -
-    L Ω. L is the base radius.
+    Rim speeds: A and B ∓cos 30° Vx - sin 30° Vy - L Ω, C Vy - L Ω. L is the base radius.
     """
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -43,9 +42,8 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 ) -> None:
     """The body twist is computed from wheel rates with the odometry matrix of the manual.
 
-    The manual has two forms of this matrix. The form with the factor 1/(2 cos 30°) is right. The
-    other form, which is multiplied out, is wrong: its velocity along x is only 3/4 of the true
-    velocity.
+    The manual's form with the factor 1/(2 cos 30°) is right. Its multiplied form is wrong: the
+    velocity along x is only 3/4 of the true one.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
@@ -92,9 +90,9 @@ def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """The robot turns left at 1 rad/s. Each rim moves at -L m/s, where L is the base radius in m.
+    """In a left turn at 1 rad/s, each rim moves at -L m/s, where L is the base radius in m.
 
-    If all wheels turn forward, the robot turns right. The manual calls this «rotate all».
+    The manual calls the right turn, with all wheels forward, «rotate all».
     """
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

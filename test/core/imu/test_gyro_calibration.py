@@ -48,11 +48,9 @@ def stand(
 ) -> None:
     """Give readings at 100 Hz to the calibration, and a displacement after every fourth reading.
 
-    ``rates``: the readings of the gyro, in rad/s.
+    ``rates``: gyro readings in rad/s. ``force``: specific force in every reading, in m/s².
 
-    ``force``: the specific force in every reading of the accelerometer, in m/s².
-
-    ``rolling``: x and y in m, and turn in rad, of each displacement. None: no displacements.
+    ``rolling``: x and y in m, and turn in rad, of each displacement; None: no displacements.
     """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):
@@ -163,10 +161,9 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """The readings have gaps, and each gap restarts the calibration. So it is not complete in time.
+    """A calibration that gaps in the readings restart again and again fails at its time limit.
 
-    At its time limit, the calibration fails. It leaves the bias as it was, and its message names
-    the gaps.
+    The bias stays as it was, and the message names the gaps.
     """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)

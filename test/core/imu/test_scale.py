@@ -68,11 +68,9 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """The sensor and the driver are each set to a range of 2, 4, 8 or 16 g.
+    """If sensor and driver have different ranges, the advice is to set ``accel_range``.
 
-    If the two ranges differ, the driver measures a wrong gravity. The advice is then to set the
-    parameter ``accel_range`` to the sensor's range. An additional error of 8 % does not change the
-    advice.
+    The measured gravity shows the sensor's range of 2, 4, 8 or 16 g, even with an error of 8 %.
     """
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)

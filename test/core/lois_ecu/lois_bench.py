@@ -27,7 +27,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 class Bench(AnyBench):
-    """A session with a simulated LOIS ECU. A new bench has been in state nominal for 1.5 s.
+    """A session with a simulated LOIS ECU, which has been in state nominal for 1.5 s.
 
     ``steps``: encoder ticks of one turn of a wheel.
 

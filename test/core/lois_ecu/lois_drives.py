@@ -33,10 +33,9 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""Settings with gains for the speed controllers of both wheels, as a user may set them.
+"""Settings with the gains that the ECU's own host writes for the speed controllers of both wheels.
 
-The ECU's own host writes these gains. With the gains that the public firmware boots with, the right
-wheel's speed would oscillate.
+With the gains that the public firmware boots with, the right wheel's speed would oscillate.
 """
 REPEAT_S = 0.05
 LATE_READS_S = (0.05, 0.35)
@@ -78,7 +77,7 @@ VARIED = (
 )
 """Names of motions in ``test/integrity/lois_odometry.py``: drives of 5 m, and turns of 80° to 400°.
 
-The seed of a motion sets its speed. It also sets the curvature of a curve, or the angle of a turn.
+The seed of a motion sets its speed, and the curvature or angle.
 """
 
 
@@ -123,9 +122,8 @@ class Drive:
 
     ``true``: true pose at the time of the last estimate.
 
-    ``way_m``: true length of the driven path.
-
-    ``turned_rad``: sum of the absolute values of all true turns.
+    ``way_m``, ``turned_rad``: true length of the path, and sum of all true turns without their
+    signs.
     """
 
     true: Pose
@@ -314,9 +312,8 @@ def motion(
 ) -> Drive:
     """Drive one of the motions ``MOTIONS`` or ``VARIED``, and return the outcome.
 
-    The encoders begin at random positions between two ticks. ``loss``: probability that a byte is
-    lost. ``reads_s``: least and greatest time between two reads of the driver, in s.
-    ``own_periods``: whether the board keeps its own periods.
+    The encoders begin at random positions between two ticks. ``Rig`` describes ``loss``,
+    ``reads_s`` and ``own_periods``.
     """
     rig = Rig(settings, ours, loss=loss, reads_s=reads_s, own_periods=own_periods)
     random = Random(f"encoders {settings.seed}")

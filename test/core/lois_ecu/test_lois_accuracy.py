@@ -49,9 +49,9 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
     ],
 )
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """Wheels of wrong sizes slip on uneven ground. The covariance fits the error of the pose.
+    """The covariance fits the pose error of wheels of wrong sizes that slip on uneven ground.
 
-    The limit of the test is so high that only one in 10,000 drives fails by chance.
+    Only one in 10,000 drives exceeds the limit of the test by chance.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
@@ -84,10 +84,10 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """One byte in a hundred is lost, which damages about half of the tick and odometry reports.
+    """The odometry stays accurate if one byte in a hundred is lost.
 
-    The tick counts in later reports include the ticks of the damaged reports, so the odometry stays
-    accurate.
+    The loss damages about half of the reports. Later tick counts include the ticks of the damaged
+    reports.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)

@@ -21,9 +21,10 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """The robot drives backward. The public firmware then counts no ticks and reports integer RPM.
+    """After a backward drive, the distance is right within 3 %, and the position within 10 % of it.
 
-    The distance is right within 3 %. The mean error of the position is below 10 % of the distance.
+    The position error is a mean over the drives. The public firmware then counts no ticks, and
+    reports integer RPM.
     """
     seeds = (1,) if firmware == "documented" else (1, 2)
     drives = [driven(firmware, "reverse", seed) for seed in seeds]
@@ -39,8 +40,8 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
     """The covariance fits the error of the pose, also with the gains that the board boots with.
 
-    With these gains, the right wheel stops, and the board still reports a speed for it. The median
-    of four drives is checked, because a few drives have a larger error.
+    With these gains, the right wheel stops, and the board still reports a speed. The median of four
+    drives is checked.
     """
     ours = LoisEcuSettings()
     names = {1000: "place right", 1003: "straight back", 1004: "curve back", 1001: "place right"}
@@ -63,9 +64,8 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """The odometry detects that a wheel was at rest before the driver started it again.
 
-    The driver commands 7 RPM backward, but the board keeps reporting 12 RPM. A rolling wheel would
-    have slowed down to 7 RPM, so this wheel is at rest. The odometry subtracts the distance that it
-    has added since the reported speed last changed.
+    The board kept reporting 12 RPM after a command of 7 RPM. The distance since the reported speed
+    last changed is subtracted.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -73,11 +73,9 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 
 
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
-    """A busy computer reads several reports at once, and the driver uses all of them.
+    """The driver uses all of the reports that a busy computer reads at once, every 0.05 to 0.35 s.
 
-    The driver reads only once in 0.05 to 0.35 s, so one read contains several reports. From these
-    reports, the driver detects each wheel that stops. If it did not, the position would be wrong by
-    4 m.
+    If it did not detect each wheel that stops, the position would be wrong by 4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -85,10 +83,9 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 
 
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
-    """The driver does not take a wrong heading of the board for a sign that a resting wheel rolls.
+    """A wheel that was found at rest is not assumed to roll because the board's heading differs.
 
-    In a turn, the wheel that turns backward stops, and the driver detects this. The board still
-    computes its heading from the old speed of this wheel, so the board's heading becomes wrong.
+    The board computes its heading from the old speed of this wheel, so this heading is wrong.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)
@@ -101,8 +98,7 @@ def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_compute
 ) -> None:
     """The covariance after a turn in place includes the heading error that a busy computer causes.
 
-    The driver reads only once in 0.05 to 0.35 s, so it detects late what the wheels do. This makes
-    the heading wrong by up to 30°.
+    Reads every 0.05 to 0.35 s make the heading wrong by up to 30°.
     """
     one = motion(wrong("firmware", seed), "place left", HOST_GAINS, reads_s=LATE_READS_S)
     assert one.sigmas < 4.0
@@ -120,10 +116,10 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> None:
-    """The odometry follows wheels that roll backward at twice the commanded speed.
+    """The distance is right within 3 % if wheels roll backward at twice the commanded speed.
 
     A large feed-forward causes this speed. The public firmware counts no ticks backward, but the
-    board's odometry (0x20) shows the speed. So the distance is right within 3 %.
+    board's odometry (0x20) shows the speed.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", 2), motors=motors), "reverse", HOST_GAINS)
@@ -135,9 +131,8 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> N
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
     """Above 50 RPM, the board's own heading (0x20) leads to a larger yaw variance.
 
-    At 62 RPM, some ticks follow the previous tick so soon that the firmware measures no speed. This
-    makes the board's heading less accurate, so the odometry filter adds variance to the yaw. At 32
-    RPM, it adds none.
+    At 62 RPM, the firmware measures no speed for some ticks, because they follow each other too
+    soon.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

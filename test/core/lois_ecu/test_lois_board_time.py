@@ -112,8 +112,7 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """After a jump of the board's clock, the delay of the next tick report is irregular.
 
-    All reads are on time, so the estimated delay is about 0 and regular before the jump. The clock
-    jumps by 0.05 s or 0.2 s, ahead or back. The next delay differs from 0 by the same amount.
+    All reads are on time. The delay differs from 0 by the jump: 0.05 s or 0.2 s, ahead or back.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -125,10 +124,9 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 
 
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
-    """If reads are often late, one more late read is not irregular.
+    """If reads are often up to 0.1 s late, one more read that is 0.1 s late is not irregular.
 
-    Reads are up to 0.1 s late at random. One more read that is 0.1 s late is therefore not
-    irregular. But a read that seems 0.06 s early is irregular: late reads do not explain it.
+    A read that seems 0.06 s early is irregular, because late reads do not explain it.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

@@ -60,10 +60,9 @@ def squared_errors(
 def test_the_variances_of_the_twist_are_honest_while_the_robot_coasts(
     firmware: Any, vx_mps: float, yaw_rate_radps: float
 ) -> None:
-    """The robot drives and stops. The board cuts the power at its controller's next step.
+    """The variances of the twist include the unknown time at which the board cuts the power.
 
-    The driver does not know when this step comes. The variances of the speed and of the yaw rate
-    include this error.
+    After a stop, the board does so at the next step of its controller.
     """
     errors = squared_errors(firmware, vx_mps, yaw_rate_radps)
     assert len(errors) >= 5 * STOPS

@@ -34,10 +34,9 @@ RPM = math.tau / 60
 @pytest.mark.slow
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """After the port is opened, the driver configures the board. Then the robot can be driven.
+    """After the port is opened, the driver configures the board, and the robot can be driven.
 
-    The driver writes the low-pass gain, the periods of the messages and the gains of the
-    controllers.
+    It writes the low-pass gain, the periods of the messages and the gains of the controllers.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
@@ -74,10 +73,9 @@ def test_a_restarted_board_is_configured_again() -> None:
 
 @pytest.mark.slow
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
-    """The board restarts so fast that the driver notices no silence.
+    """Tick counters that begin at zero again show a restart that is too fast for a silence.
 
-    The tick counters begin at zero again. This shows the driver that the board has restarted, so
-    the driver configures it again.
+    The driver then configures the board again.
     """
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
@@ -139,8 +137,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    The public firmware does not count ticks while the robot drives backward. So after a backward
-    drive, the ticks prove nothing.
+    After a backward drive, they prove nothing on the public firmware, which then counts no ticks.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -163,10 +160,9 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """A robot that was stopped starts again at any speed.
+    """A robot that was stopped starts again at any speed, even without feed-forward.
 
-    After a stop, the firmware keeps the last speed of each wheel, which could prevent the next
-    start. The driver clears this speed. So the wheels start again, even without feed-forward.
+    The driver clears the last speed of each wheel, which the firmware keeps after a stop.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings())
     rig.run(5.0)
@@ -181,10 +177,8 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    The robot drives backward at 30 RPM and is stopped. The test then writes 8 RPM backward directly
-    to the board, without the RPM 0/0 that the driver would send first. The firmware still uses the
-    last measured speed, which is higher than 8 RPM. Without feed-forward, the wheels then get no
-    power.
+    The test writes 8 RPM backward to the board after a stop from 30 RPM. The firmware still uses
+    the last measured speed, so the wheels get no power without feed-forward.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -219,10 +213,9 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
     [*(("firmware", kind) for kind in RecordKind), ("documented", RecordKind.TORQUE)],
 )
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The user requests a record while the wheels turn, for example of the times between ticks.
+    """A record that is requested while the wheels turn is delivered with all its samples.
 
-    The driver delivers all samples of the record. It also knows the unit of the times, which
-    depends on the firmware.
+    The driver knows the unit of the times in it, which depends on the firmware.
     """
     rig = Rig(nominal(firmware))
     rig.run(4.0)

@@ -2,8 +2,7 @@
 
 """Tests of the period with which the board sends the GPS date, and of requests for one date.
 
-The driver requests one date to confirm the board's settings. This request has a side effect: the
-board no longer sends the date periodically.
+The driver confirms the board's settings by such a request, which ends the periodic dates.
 """
 
 import pytest
@@ -17,8 +16,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 class DeafBench(Bench):
     """A bench that loses one of the lines that set the period of the date.
 
-    ``nth``: number of the line that does not reach the board, counted from 1. With 0, no line is
-    lost.
+    ``nth``: number of the lost line, counted from 1; 0: no line is lost.
     """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
@@ -39,10 +37,10 @@ class DeafBench(Bench):
 @pytest.mark.slow
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """A request for one date ends the periodic dates, so the driver sets the period again.
+    """The board has the right period of the date even if one of the lines with the period is lost.
 
-    The driver sends the line with the period several times. One of these lines is lost.
-    Nevertheless, the board has the right period in the end.
+    The driver sends this line several times after a request for one date, which ends the periodic
+    dates.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -56,8 +54,8 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
     """The driver confirms the board's settings, and keeps the user's period of the date.
 
-    To confirm the settings, the driver requests one date. The board then no longer sends the date
-    periodically. So the driver sets the period again afterwards.
+    The confirmation requests one date, which ends the periodic dates, so the driver sets the period
+    again.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

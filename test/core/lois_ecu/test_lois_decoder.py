@@ -64,7 +64,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
     """The decoder returns a plausible group of lines as soon as its last byte arrives.
 
-    The first group of each kind is an exception: it waits for the next line or for a silence.
+    Only the first group of each kind waits for the next line or for a silence.
     """
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
@@ -107,8 +107,7 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
     """The decoder drops a group in which one line is damaged, and returns the next group.
 
-    There is one exception: if only the last line of a group arrives twice, the decoder returns the
-    group. A GPS fix is dropped in this case too.
+    Exception: a group whose last line arrives twice is returned, unless it is a GPS fix.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -216,11 +215,10 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The decoder drops a report whose tick counts jump, and checks the next report.
+    """The decoder drops a report whose tick counts jump, and returns the next report.
 
-    If the next report continues from the counts before the jump, only the dropped report was wrong.
-    If it continues from the counts after the jump, the board has restarted. In both cases, the
-    decoder returns the next report.
+    * The next report continues the counts before the jump: only the dropped report was wrong.
+    * It continues the counts after the jump: the board has restarted.
     """
     decoder = LoisDecoder()
     said = [
@@ -251,9 +249,9 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """The decoder counts a valid line that it cannot use, and returns no report for it.
+    """The decoder counts a valid line of unknown kind or with a value out of range as unknown.
 
-    The kind of this line is unknown, or a value in it is out of range.
+    It returns no report for such a line.
     """
     total = 0
     for character in line[:11]:
@@ -299,10 +297,9 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 
 
 def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None:
-    """The board sends lines with a checksum, and the decoder does not require it.
+    """A line that lost two characters is not taken for a line without a checksum.
 
-    A line loses two characters, so it is as long as a line without a checksum. It is discarded.
-    Lines without a checksum are accepted after a few of them have come.
+    Both have the same length. Real lines without a checksum are accepted after a few of them.
 
     Bug: zero ticks became 57 ticks, because the checksum was read as a part of the value.
     """
@@ -316,11 +313,9 @@ def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None
 
 
 def test_half_an_odometry_group_of_zeros_is_not_a_report_of_ticks() -> None:
-    """The robot has not driven, so the board's odometry after the ticks consists of zeros.
+    """The second half of an odometry group of zeros, read late, is not a report of ticks.
 
-    The driver stalls in this group, and reads its second half late. It returns no ticks of zeros.
-
-    Bug: their clock of 0 showed a restart of the board.
+    Bug: ticks of zeros, with a clock of 0, showed a restart of the board.
     """
     ticks, odometry = Ticks(4317, 0, 0), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     decoder = LoisDecoder()
