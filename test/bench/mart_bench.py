@@ -52,8 +52,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with the floor, and an empty list of further sections.
-    """
+    """Return figures that compare the driver with the floor, and an empty list of further sections."""
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]

@@ -191,8 +191,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """After a command has expired, another topic's command is sent at once, without a second Stop.
-    """
+    """After a command has expired, another topic's command is sent at once, without a second Stop."""
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)

@@ -51,10 +51,9 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
 
 
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again() -> None:
-    """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
+    """The odometry detects that a wheel has stopped, although the board still reports 20 RPM.
 
-    The odometry detects that the wheel is at rest. If it did not, the estimated heading would be
-    wrong by 600°.
+    The wheel slowed from 41 to 20 RPM before. Undetected, it would make the heading wrong by 600°.
     """
     one = motion(nominal("firmware", 2020), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)

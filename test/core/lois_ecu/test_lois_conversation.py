@@ -115,10 +115,10 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 @pytest.mark.slow
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """The user wants lines without checksums. The driver selects them with value 4 of command 0x11.
+    """A robot whose user has switched the checksums off can be driven.
 
-    On the board, this command also overwrites another setting, the left wheel's "short correction".
-    So the driver writes this setting again.
+    Value 4 of command 0x11 does so, and overwrites the left wheel's "short correction", which the
+    driver therefore writes again.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver.confirmed:
@@ -237,11 +237,10 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("loss", "outcome"), [(0.0, RecordReading), (0.004, RecordFailed)])
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
-    """While a board with the public firmware sends a record, its clock stops for 0.12 s.
+    """The tick reports after a record are not regarded as late, even if lines of it are lost.
 
-    By this clock, the tick reports after the record seem late. The driver takes the stop of the
-    clock into account, even if lines of the record are lost. Otherwise, ``odom`` would jump some
-    seconds later.
+    The board's clock stops for 0.12 s during the record. If this were ignored, ``odom`` would jump
+    some seconds later.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)
