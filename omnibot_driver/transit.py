@@ -8,7 +8,7 @@ difference = arrival by our clock - sending by the sender's clock;
 offset = the sender's smallest difference;
 delay = difference - offset.
 
-docs/internals/stopping.md has the reasons and limits. This module must not read a clock or use ROS.
+Reasons: docs/internals/stopping.md. This module must not read a clock or use ROS.
 """
 
 import math
@@ -19,17 +19,18 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, in a series of late messages. After a longer pause, a new series begins. If
-a series lasts ``HEALS_AFTER_S`` (s), the sender's clock was probably set back."""
+"""Longest pause, in s, in a series of late messages.
+
+If a series lasts ``HEALS_AFTER_S`` (s), the sender's clock was probably set back.
+"""
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
 corrects a clock."""
 LARGEST_CORRECTION_S: Final = 0.4
 LASTING_DRIFT: Final = 1e-4
-"""Largest assumed drift between two clocks over a long time, in s per s.
+"""Largest assumed drift between two clocks over a long time, in s per s: that of their crystals.
 
-This is the tolerance of their crystals. NTP adds at most ``LARGEST_CORRECTION_S``; it steps the
-clock if the error is larger.
+NTP adds at most ``LARGEST_CORRECTION_S``, because it steps the clock if the error is larger.
 """
 CLOCK_RETREATS: Final = 10.0
 """Factor by which a message that is too early fits a sender worse than one that is too late."""
@@ -44,8 +45,7 @@ KNOWN_AFTER: Final = 10
 fewer messages, all of them may have been delayed."""
 
 Differences = tuple[float, float]
-"""Arrival minus sending by the sender's clock, in s: by our time of day, and by our steady clock.
-"""
+"""Arrival minus sending, in s: with our time of day, and with our steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,8 +71,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: time of sending by our clock. While the offset of the sender's clock is unknown,
-      the time by the sender's clock follows as a second possible time.
+    * ``sent_ns``: time of sending by our clock, and also by the sender's clock while its offset is
+      unknown.
     """
 
     total_s: float
@@ -105,8 +105,7 @@ class Transit:
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
         """Return the delay of this message, estimated from earlier messages of its sender.
 
-        A sender's first message is assumed to have no delay in transit. ``longest_s``: a message
-        with a longer delay is late.
+        A sender's first message is assumed to be in time. A delay over ``longest_s`` is late.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -166,7 +165,7 @@ class _Sender:
         """Return the smallest and the largest possible misfit of a message to this sender, in s.
 
         The misfit is the time by which the message is too late, or ten times (``CLOCK_RETREATS``)
-        the time by which it is too early. The unknown drift of the clocks makes it uncertain.
+        the time by which it is too early.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
@@ -183,9 +182,10 @@ class _Sender:
 
 
 class _Offset:
-    """The offset of one of our two clocks from a sender's clock: the smallest difference so far.
+    """The offset of one of our two clocks from a sender's clock.
 
-    A difference is the arrival by our clock minus the sending by the sender's clock.
+    It is the smallest recent difference (arrival minus sending), and follows the drift of the
+    clocks.
     """
 
     def __init__(self, difference_s: float, at_s: float) -> None:
@@ -196,8 +196,7 @@ class _Offset:
     def late_s(self, difference_s: float, at_s: float) -> float:
         """Return the least time in s by which a message may be late; it may be negative.
 
-        The largest possible drift is subtracted. ``difference_s``: arrival by our clock minus
-        sending by the sender's clock.
+        ``difference_s``: arrival by our clock minus sending by the sender's clock.
         """
         return difference_s - self._least_s - self._drift_s(at_s)
 

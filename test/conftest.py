@@ -43,8 +43,8 @@ WAITING = ("faults", "system", "tools")
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Order the test files for parallel workers: the longest first, then two kinds by turns.
 
-    If many tests that wait in real time ran at once, their drivers would get too little processor
-    time. So files of computing tests lie between them.
+    Tests that wait in real time alternate with computing tests, so that their drivers have enough
+    processor time.
     """
     if not hasattr(config, "workerinput"):
         return

@@ -2,7 +2,7 @@
 
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-Every LinkError says what to do. The transports must not know boards, or the threads that use them.
+Every LinkError says what to do. Transports must not know boards, or the threads that use them.
 """
 
 from collections.abc import Mapping
@@ -37,16 +37,12 @@ class Transport(Protocol):
     def descriptors(self) -> tuple[int | None, ...] | None:
         """File descriptors in the order of the channels, for another process to inherit.
 
-        A missing line has None instead of a descriptor. The result is None if descriptors cannot be
-        inherited.
+        A missing line has None. The result is None if descriptors cannot be inherited.
         """
 
     @property
     def missing(self) -> Mapping[int, str]:
-        """The missing lines. The result is empty if no line is missing.
-
-        Each key is a channel. The value says why its line is missing, and what to do.
-        """
+        """The missing lines, by channel: why each is missing, and what to do."""
 
     @property
     def ends_with_us(self) -> bool:
@@ -62,15 +58,14 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet; return an empty packet if none arrives for a while.
 
-        Raises LinkError if the only line or all lines are lost. Raises LinesChanged if one of
-        several lines was lost or opened again.
+        Raises LinkError if no line is left, LinesChanged if one of several was lost or opened
+        again.
         """
 
     def write(self, packets: Packets) -> None:
-        """Write all packets.
+        """Write all packets. A missing line gets only the bytes that it accepts at once.
 
-        A missing line of several gets only the bytes that it accepts at once; the others are
-        discarded. Raises LinkError, and discards all unsent bytes, if the connection is lost.
+        Raises LinkError, and discards all unsent bytes, if the connection is lost.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -2,8 +2,7 @@
 
 """Finds out whether the name of a silent host still has the address in use.
 
-A host may return with another address, for example from DHCP. This module must not know what is
-sent to the host.
+A host may return with another address, for example from DHCP.
 """
 
 import contextlib
@@ -21,7 +20,7 @@ least time between two such lookups."""
 class HostName:
     """The name of a host, and whether the host has left the address ``in_use``.
 
-    A lookup can take long, so it runs in its own thread, one at a time.
+    A lookup can take long, so one thread at a time does it.
     """
 
     def __init__(self, name: str, in_use: str) -> None:
@@ -38,7 +37,7 @@ class HostName:
     def has_moved(self) -> bool:
         """Return whether the host is silent and its name no longer leads to the address in use.
 
-        If a lookup is due, this begins it and does not wait for it.
+        A lookup that is due begins, and the call does not wait for it.
         """
         now = time.monotonic()
         if not self._is_name or now < self._heard_s + SILENT_S:

@@ -23,7 +23,7 @@ from omnibot_driver.transports import NOT_POLLABLE
 def check_address(url: str, parameter: str = "port", *, pollable: bool = False) -> None:
     """Raise ParameterError if no attempt to open this port can ever succeed.
 
-    A missing device or an unknown host is accepted, because it may appear later. No port is opened.
+    A missing device or an unknown host is accepted: it may appear later. No port is opened.
 
     ``pollable``: whether the port must have a file descriptor.
     """
@@ -129,7 +129,7 @@ def _no_terminal(url: str, parameter: str) -> str:
 def _owner(path: str) -> str:
     """Return number and name of the process that has locked the file ``path``, in brackets.
 
-    The result is empty if no process has locked the file, or if the name cannot be read.
+    Empty if no process has locked the file, or if its name cannot be read.
     """
     with contextlib.suppress(OSError, ValueError):
         status = os.stat(path)

@@ -73,8 +73,7 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        The guard process gets copies of them. With a copy of a missing line's descriptor, the
-        driver could not open this line again.
+        The guard process copies them. A copy for a missing line would prevent its reopening.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -92,7 +91,7 @@ class Several:
     def overruns(self) -> int | None:
         """How often the kernel has lost bytes, over all lines; None if an open line has no count.
 
-        Earlier connections of a line that was opened again are included.
+        Earlier connections are included.
         """
         counts = [line.overruns for line in self._lines]
         return None if None in counts else sum(filter(None, counts))
@@ -100,7 +99,7 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line was lost or opened again, LinkError if all lines are missing.
+        Raises LinesChanged if a line was lost or reopened, LinkError if all lines are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -131,9 +130,8 @@ class Several:
         """Write each packet to its line.
 
         * A line that does not accept all bytes: the other bytes wait.
-        * A line with waiting bytes for 0.2 s without a break: the bytes are discarded, and the line
-          is regarded as missing.
-        * A missing line whose port is still open: only the bytes that the port accepts at once are
+        * Bytes have waited for 0.2 s without a break: they are discarded, and the line is missing.
+        * A missing line with an open port: only the bytes that the port accepts at once are
           written.
         """
         now = time.monotonic()
@@ -180,8 +178,7 @@ class Several:
     def _open_missing(self) -> None:
         """Open the missing lines whose retry is due.
 
-        The port of a missing line may still be open, for example if the line is blocked. Such a
-        port is closed first.
+        The port of a blocked line may still be open, and is closed first.
         """
         now = time.monotonic()
         for channel, line in enumerate(self._lines):
@@ -207,8 +204,7 @@ class Several:
     def _write_what_waits(self, now: float) -> None:
         """Write the waiting bytes, and let ``poll`` report when a full line accepts more.
 
-        A line with waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) without a break becomes a missing
-        line.
+        A line whose bytes have waited for 0.2 s (``WRITE_TIMEOUT_S``) becomes a missing line.
         """
         with self._writing:
             for line in self._lines:
@@ -291,7 +287,7 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
 
-        A missing line whose port is still open gets only the bytes that the port accepts at once.
+        A missing line with an open port gets only the bytes that it accepts at once.
         """
         if self.port is None:
             return True
@@ -306,7 +302,7 @@ class Line:
     def flush(self, now: float) -> bool:
         """Write waiting bytes; return False if bytes have waited for 0.2 s without a break.
 
-        Before it returns False, the method discards all bytes that are not sent yet.
+        All unsent bytes are then discarded.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

@@ -28,7 +28,7 @@ class SimulatedTransport:
 
     ``simulator``: full name of the board's package.
 
-    Raises ParameterError if the URL is wrong, RuntimeError if the board's thread has died.
+    Raises ParameterError for a wrong URL, RuntimeError if the board's thread has died.
     """
 
     missing = NONE_MISSING

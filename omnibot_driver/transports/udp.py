@@ -2,7 +2,7 @@
 
 """Datagrams to one host: ``udp://host:port``. Each further channel uses the next higher port.
 
-A silent host causes no error, because it may answer later. A new address of its name does.
+A silent host is an error only if its name has got another address.
 """
 
 import contextlib
@@ -67,7 +67,7 @@ class UdpPorts:
     def read(self) -> Packet:
         """Return one datagram and its channel, or ``(0, b"")`` if none arrives within 0.2 s.
 
-        Raises LinkError if the connection is lost, or if the silent host has another address now.
+        Raises LinkError if the connection is lost, or a silent host has another address now.
         """
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
@@ -129,7 +129,7 @@ class UdpPorts:
     def _connect(self, channels: int) -> None:
         """Connect the sockets of all channels to the same address of the host.
 
-        Motor controllers seldom know IPv6. So if the host also has an IPv4 address, this is used.
+        IPv4 is preferred, because motor controllers seldom know IPv6.
         """
         found = socket.getaddrinfo(self._host, self._port, type=socket.SOCK_DGRAM)
         family, kind, protocol, _, (address, _, *rest) = min(

@@ -2,12 +2,9 @@
 
 """A subscriber in its own process: it records each Imu and Odometry until stdin is closed.
 
-Arguments: namespaces. Output: a JSON object with two arrays for each namespace. All times are by
-the steady clock, in s.
-
-``heard``: time and acceleration along x of each Imu.
-
-``odometries``: time of each Odometry, as an array of one element.
+Arguments: namespaces. Output: JSON with two arrays for each namespace, with times of the steady
+clock in s. ``heard``: time and acceleration along x of each Imu. ``odometries``: each Odometry, as
+[time].
 """
 
 import json

@@ -7,9 +7,9 @@ JointState for every delta frame.
 
 ``commands PORT NAMESPACE``: write a frame for every cmd_vel.
 
-``bare PORT NAMESPACE``: only create the driver's topics and services, to show the memory of ROS.
+``bare PORT NAMESPACE``: only create the driver's topics and services.
 
-Each Imu and each command contains a number for the benchmark.
+The benchmark recognizes each Imu and each command by a number in it.
 """
 
 import os

@@ -2,8 +2,8 @@
 
 """Command several robots in turn, 40 times a second each.
 
-Arguments: duration in s, and namespaces. Output: a JSON list with an array for each namespace. An
-array has an item for each command: the steady clock's time in s, and the speed in board units.
+Arguments: duration in s, and namespaces. Output: for each namespace, a JSON array of (time of the
+steady clock in s, speed in board units).
 """
 
 import json

@@ -2,8 +2,7 @@
 
 """The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-The driver and the floor (the smallest program with the same output) get the same bytes of a robot
-at rest.
+The driver and the floor (the smallest equivalent program) get the same bytes of a robot at rest.
 """
 
 import bisect
@@ -86,10 +85,7 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return the comparisons of the driver with the floor, and an empty list.
-
-    The caller expects a list of further sections for the report. The LOIS ECU has none.
-    """
+    """Return figures that compare the driver with the floor, and an empty list of further rows."""
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}

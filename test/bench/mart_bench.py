@@ -2,8 +2,8 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-The driver and the floor (the smallest program with the same output) each have a simulated
-controller on UDP. In the driver, a new speed waits for the reply to a query; a stop does not.
+The driver and the floor (the smallest equivalent program) each have a controller on UDP. The
+driver's new speed, but not its stop, waits for the reply to a query.
 """
 
 import time
@@ -52,7 +52,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with the floor, and an empty list of further sections."""
+    """Return figures that compare the driver with the floor, and an empty list of further rows."""
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]

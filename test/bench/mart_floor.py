@@ -2,8 +2,8 @@
 
 """The floor for a MART: the smallest program with the same output, without any checks.
 
-``HOST PORT NAMESPACE``: query encoder and heading 16 times a second each, and publish an Odometry
-and a JointState for each encoder count. Send RM or RMCS for every cmd_vel.
+``HOST PORT NAMESPACE``: query encoder and heading 16 times a second each; publish an Odometry and a
+JointState for each encoder count; send RM or RMCS for every cmd_vel.
 """
 
 import socket

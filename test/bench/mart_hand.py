@@ -2,9 +2,8 @@
 
 """Command several MART robots with the same speed, which changes every 1 to 3 s and may be zero.
 
-Arguments: duration in s, and namespaces. Output: a JSON list with an array for each namespace. An
-array has a pair for each speed: the steady clock's time of its first message in s, and the speed in
-m/s.
+Arguments: duration in s, and namespaces. Output: for each namespace, a JSON array of (time of the
+first message with the speed, by the steady clock in s; speed in m/s).
 """
 
 import json

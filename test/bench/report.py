@@ -2,8 +2,8 @@
 
 """The performance report, which ``make bench`` writes into docs/internals/performance.md.
 
-``--quick`` shortens all measurements, to test that the program runs. The exit code is 1 if a goal
-is missed. The floor is the smallest program with the same output as the driver.
+``--quick``: only test that the program runs. Exit code 1: a goal is missed. The floor is the
+smallest program with the same output as the driver.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
 """Measurement of the driver and the floor on a simulated small computer. Only root can run it.
 
-The floor is the smallest program with the same output as the driver. Linux's cgroups give each
-program a share of one core, with the shortest period, so that the programs run evenly.
+The floor is the smallest program with the same output. Linux's cgroups give each program a share of
+one core.
 """
 
 import math
@@ -29,10 +29,7 @@ NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"
 STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
-"""Time in s to wait for a Stop after the last command.
-
-This time is fixed, so that the measurement takes equally long for every share of a core.
-"""
+"""Time in s to wait for a Stop after the last command, equally long for every share of a core."""
 
 
 class Group:

@@ -2,9 +2,8 @@
 
 """Timers that measure the processor time of each stage of the driver's reader.
 
-The driver's process imports this module first. At its end, a JSON object with the times in s is
-written to the file in the environment variable SPLIT. ``passed``: the time for which the reader
-ran.
+The driver's process imports this module first, and at its end writes the times in s, as JSON, to
+the file in the environment variable SPLIT. ``passed``: the time for which the reader ran.
 """
 
 import atexit

@@ -2,7 +2,7 @@
 
 """Simulated boards on pseudo-terminals that send the stream of nominal mode and record commands.
 
-The boards take turns within each tick of 10 ms. The first word of every IMU frame is a number.
+The boards take turns within each tick. The first word of an IMU frame is a number.
 """
 
 import heapq

@@ -2,9 +2,8 @@
 
 """Relays of a board's data, each with one more task than the relay before.
 
-Each has more tasks than the floor (the smallest program with the same output as the driver), and
-fewer than the driver. Arguments: a key of STEPS, the port, the namespace. Nothing is written to the
-port.
+Each has more tasks than the floor (the smallest program with the driver's output), and fewer than
+the driver. Arguments: a key of STEPS, the port, the namespace. Nothing is written to the port.
 """
 
 import os

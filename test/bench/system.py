@@ -120,10 +120,7 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return the rows of a table of the cost of the driver's tasks.
-
-    The first row is the floor. Each further row adds one task. The last row is the driver.
-    """
+    """Return the rows of a table of the cost of each task, from the floor to the driver."""
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))

@@ -2,7 +2,7 @@
 
 """Test bench in simulated time: a session, connected to the simulated robot of any board.
 
-It is for tests of the rules for motion (what may move or stop a robot).
+It is for tests of what may move or stop a robot.
 """
 
 from collections.abc import Callable
@@ -234,8 +234,7 @@ class AnyBench:
     def run(self, seconds: float) -> None:
         """Advance the simulated time by ``seconds``.
 
-        The session is called only when data arrives, or when its time ``wake_at`` is reached. The
-        driver calls it in the same way.
+        As in the driver, the session is called only when data arrives, or at its time ``wake_at``.
         """
         wake_s = self.session.wake_at
         for _ in range(round(seconds / TICK_S)):

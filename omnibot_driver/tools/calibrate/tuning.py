@@ -2,7 +2,7 @@
 
 """Finds the gains of the manual's control law that suit a motor, and predicts their effect.
 
-The best gains have the smallest absolute errors after steps of the command and of the load.
+The best gains have the smallest absolute errors after steps of command and load.
 """
 
 from collections.abc import Sequence
@@ -83,9 +83,7 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    The errors of each motor are divided by its errors with the present gains ``now``.
-
-    Raises ToolError if no gains are within the limits.
+    ``now``: present gains, to which errors are relative. Raises ToolError if no gains are allowed.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

@@ -2,8 +2,8 @@
 
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-A tick is the control period of 10 ms. Units: encoder counts per tick, PWM steps and ticks. The dry
-friction is constant, so a wheel must not change its direction.
+Units: ticks of 10 ms, encoder counts per tick, PWM steps. A wheel must not change its direction,
+because the dry friction is constant.
 """
 
 from dataclasses import dataclass
@@ -50,8 +50,8 @@ def answer(
 ) -> Array:
     """Return the speed of a simulated wheel during each tick, with the manual's control law.
 
-    In the first tick, the commanded speed becomes ``command``, in counts per tick, and the load
-    becomes ``load``, in PWM steps. ``ticks``: duration of the simulation.
+    ``ticks``: duration. ``command``, ``load``: speed in counts per tick and load in PWM steps, both
+    from the first tick on.
     """
     forward, proportional, integral = gains.feed_forward, gains.proportional, gains.integral
     shape = np.broadcast(forward, proportional, integral).shape

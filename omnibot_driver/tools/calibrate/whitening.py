@@ -19,9 +19,8 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
     ``rows``: rows of successive residuals.
 
-    * ``lags`` is 1: the value for lag 1 is limited to the range -0.5 (only displaced encoder marks)
-      to 0 (only independent errors).
-    * ``lags`` is larger: the values are multiplied by a factor that decreases with the lag.
+    * ``lags`` is 1: lag 1 is limited to -0.5 (only displaced marks) to 0 (only independent errors).
+    * ``lags`` is larger: a factor decreases the values with the lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

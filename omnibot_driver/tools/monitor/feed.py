@@ -57,8 +57,7 @@ class Feed:
 
     Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
 
-    ``dead_man``: the dead man's switch whose commands are published on ``cmd_vel``; None if the
-    monitor must not move the robot.
+    ``dead_man``: the switch whose commands are published; None: the robot must not be moved.
     """
 
     def __init__(
@@ -192,9 +191,9 @@ class Feed:
         self._learned = False
 
     def _learn(self) -> None:
-        """Read the driver's parameters. This is done again after each change of the driver's state.
+        """Read the driver's parameters, again after each change of the driver's state.
 
-        The reason: after such a change, another driver may run under the same name.
+        After such a change, another driver may run under the same name.
         """
         if self._learned or not (self._list.service_is_ready() and self._ask.service_is_ready()):
             return

@@ -2,7 +2,7 @@
 
 """The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
-NaN and infinity are kept for the user to see. The model must not know ROS, terminals or the clock.
+NaN and infinity are kept. The model must not know ROS, terminals or the clock.
 """
 
 import math
@@ -31,8 +31,7 @@ JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
 """``JUMP_M``, ``JUMP_MPS``: in the time t, the pose may move JUMP_M + JUMP_MPS · t, in m.
 
-If the pose moves farther between two messages, the odometry was reset, and the model begins a new
-path.
+A larger motion between two messages is a reset of the odometry, and begins a new path.
 """
 
 

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steers the robot by keys, with a dead man's switch.
+"""Steers the robot by keys, with a dead man's switch; must not know ROS or terminals.
 
-A terminal does not report the release of a key, so each pressed key moves the robot only briefly.
-This module must not know ROS or terminals.
+Each pressed key moves the robot only briefly: a terminal does not report its release.
 """
 
 import math

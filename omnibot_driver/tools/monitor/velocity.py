@@ -24,10 +24,7 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """The monitor's subscription and publisher of ``cmd_vel``.
-
-    Both have the message type of the driver's subscription: a process must use one type for a
-    topic.
+    """The monitor's subscription and publisher of ``cmd_vel``, with the driver's message type.
 
     ``heard``: function that is called with each command on the topic.
 

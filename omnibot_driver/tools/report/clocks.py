@@ -40,7 +40,7 @@ def step(log: Log) -> ClockStep | None:
 def _step(series: Series) -> ClockStep | None:
     """Return the largest sudden and lasting change of the messages' delays; None if there is none.
 
-    Only the smallest delays count, because a busy computer delays messages only for a time.
+    Only the smallest delays count, because a busy computer increases delays for a time.
     """
     rows = series.only(np.isfinite(series.stamp_s))
     rows = _by_stamp(rows)

@@ -13,8 +13,7 @@ YAW_WEIGHT_M: Final = 0.143
 WHEEL_WEIGHT_M: Final = 0.029
 """Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
 
-They are the OmniBot's, and accurate enough for all robots: they only separate motion from
-standstill, and weight the axes in the search for the lag.
+The OmniBot's factors are good enough for all robots: they only detect motion and weight axes.
 """
 
 

@@ -21,8 +21,7 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""Largest number of points of a drawn line. A line with more points is cut into short pieces, and
-only the smallest and the largest value of each piece are drawn."""
+"""Largest number of points of a drawn line; a longer line is drawn by extremes of its pieces."""
 
 
 def new_figure(height_in: float) -> Figure:

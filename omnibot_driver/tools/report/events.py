@@ -16,10 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which /diagnostics shows whether the driver still ran in its last state.
+"""Time in s after which /diagnostics shows that the driver still runs in its last state.
 
-A last state "disconnected" means that the driver has ended or has lost its board. Only a running
-driver still shows the state in /diagnostics after this time.
+Without this sign, a driver in the state "disconnected" has ended.
 """
 
 
@@ -64,7 +63,7 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Return the spans in which the board was disconnected or connecting; joins adjacent spans.
+    """Return the joined spans in which the board was disconnected or connecting.
 
     Spans that end in the first 3 s of the log (``FIRST_SECONDS``) are left out.
     """
@@ -81,7 +80,7 @@ def _lost(states: list[Span]) -> list[Span]:
 def _alive(log: Log, state: Span) -> bool:
     """Return whether the driver was still running in ``state``, the last state in the log.
 
-    A running driver shows the state in /diagnostics more than 2 s (``SILENT_S``) after it began.
+    /diagnostics then shows the state more than 2 s (``SILENT_S``) after its beginning.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

@@ -48,8 +48,8 @@ class Answer:
 
     ``error``: for each axis, rms of measured - gain · commanded motion.
 
-    ``spread``: for each axis, ``error`` divided by the rms of the command; infinite if no command
-    was constant for long enough, because the gain then includes the reaction time of the motors.
+    ``spread``: for each axis, ``error`` / rms of the command; infinite if no command was constant
+    for long enough, because the motors' reaction then changes the gain.
     """
 
     lag_s: float
@@ -72,11 +72,9 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The delay is the one that fits best. The gains come from constant commands (``STEADY_S``) that
-    are not near zero. If these last less than ``SUSTAINED_S`` in all, the gains come from all
-    commands.
-
-    ``usable``: for each measurement, whether to use it.
+    The gains come from constant commands (``STEADY_S``) that are not near zero; from all commands
+    if these last less than ``SUSTAINED_S`` in all. ``usable``: for each measurement, whether to use
+    it.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -116,8 +114,7 @@ def _constant(commands: Series, at_s: Array) -> Mask:
 def judge(log: Log) -> Iterator[Finding]:
     """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    Motion during an e-stop is reported. Motion without a command is reported only if the log has
-    commands.
+    Motion during an e-stop is reported, and, if the log has commands, motion without a command.
     """
     yield from _despite_the_estop(log, twists(log))
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
@@ -175,7 +172,7 @@ def _rim_speed(pair: Pair) -> Array:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return, for each time, whether the driver ignored commands, or did so in the last 0.5 s.
+    """Return, for each time, whether commands had no effect then, or less than 0.5 s before.
 
     The driver ignores commands while the e-stop is latched or the board does not run.
     """

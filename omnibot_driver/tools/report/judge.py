@@ -65,10 +65,9 @@ def _all(log: Log) -> Iterator[Finding]:
 
 
 def _missing_imu(log: Log) -> Level:
-    """Return how severe it is that the log has no message of the IMU; GOOD if the board has none.
+    """Return how severe it is that the log has no message of the IMU.
 
-    The result is NOTE if it is unknown whether this robot has an IMU. The status Stream of a driver
-    has values for the IMU if its board has one.
+    GOOD: the board has no IMU. NOTE: unknown. BAD: the board has one.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     told = {any("IMU" in key for key in status.values) for status in streams}

@@ -201,7 +201,7 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Return the spans of time in which the text for a topic's value stayed the same.
 
-        ``name``: function that converts a value to its text, the field ``what`` of a span.
+        ``name``: function that converts a value to its text (``what`` of a span).
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

@@ -30,7 +30,7 @@ FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
 """Time in s within which short steps between timestamps compensate a long one.
 
-A long step that is compensated in time is a jump of the timestamps; otherwise messages are missing.
+A compensated long step is a jump of the timestamps; any other one means missing messages.
 """
 
 
@@ -117,8 +117,8 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the index after the last step that can compensate it.
 
-    The possible steps are the long step and those after it: ``most`` steps in all, and none from
-    the next long step on. ``wide``: indices of the long steps.
+    Only the ``most`` steps from the long step on can do so, up to the next long step. ``wide``:
+    indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

@@ -36,11 +36,10 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that this topic may have, according to its name.
+    """Return, by role, the namespace of the topic's robot, and whether the topic fits the role.
 
-    Each role has the robot's namespace, and whether the topic fits: whether its message type
-    ``kind`` is right and, for a role such as ``state``, whether it belongs to a node in
-    ``drivers``.
+    A topic fits with the right message type ``kind``. A topic such as ``~/state`` must also belong
+    to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -56,11 +55,11 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
     """Return the namespace and the topics of one robot.
 
-    ``wanted``: namespace of this robot; None selects the only robot.
+    ``wanted``: its namespace; None selects the only robot.
 
     ``where``: name of the source of the topics, for error messages.
 
-    Raises ToolError if this robot does not exist, or if ``wanted`` is None and there are several.
+    Raises ToolError if the robot does not exist, or if there are several and ``wanted`` is None.
     """
     names = ", ".join(robots)
     if not robots:

@@ -211,7 +211,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the ratio of turns by gyro to turns by odometry, and the sum of all turns in rad.
 
-    The sum has no signs. The result is None if the odometry has no turns.
+    The sum ignores directions. None if the odometry has no turns.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

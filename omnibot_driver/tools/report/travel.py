@@ -15,11 +15,9 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits, in m and rad, of the deviation between pose and twist in a
-step.
+"""``LEAP_M``, ``LEAP_RAD``: limits of the deviation between pose and twist in a step, in m and rad.
 
-A step with a larger deviation is a leap. A step goes from one message to the next. The driver's own
-corrections of odom are smaller: fastest_linear_speed limits them.
+A larger deviation between two messages is a leap. The driver's own corrections of odom are smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05

@@ -167,11 +167,7 @@ def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None
 
 
 def test_a_reversal_is_ramped_through_zero() -> None:
-    """A robot that drives forward is commanded backward.
-
-    The velocity on the line decreases through zero to the commanded one. It never changes faster
-    than the acceleration limit allows.
-    """
+    """A reversal is ramped through zero, never faster than the acceleration limit allows."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)
@@ -187,10 +183,7 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """A robot at rest is commanded to turn at 0.5 rad/s. The acceleration limit is 2 rad/s².
-
-    The yaw rate on the line reaches 0.5 rad/s (250 LSB) after 0.25 s.
-    """
+    """A turn rate of 0.5 rad/s (250 LSB) is reached after 0.25 s, at the limit of 2 rad/s²."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)

@@ -23,7 +23,7 @@ def bench() -> Bench:
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
     """An e-stop during a drive is sent at once, and stops the robot.
 
-    While it is latched, the driver refuses commands, and sends only pairs of ES and Stop.
+    Until its release, commands are refused, and only pairs of ES and Stop are sent.
     """
     bench.drive(0.5)
     bench.run(0.1)
@@ -71,7 +71,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 ) -> None:
     """An e-stop that was latched while the port was closed is sent directly after Stop and S.
 
-    Stop and S (start) are the first bytes after each opening of the port.
+    These are the first bytes after each opening of the port.
     """
     bench.close()
     assert "port is not open" in estop(bench, True)
@@ -102,9 +102,9 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """The e-stop is released, but the board itself still holds it, and ignores all commands.
+    """One notice advises to call ~/reset if the board itself still holds a released e-stop.
 
-    The board holds it until it is reset. One notice advises the user to call ~/reset.
+    Such a board ignores all commands until it is reset.
     """
     bench = driving(estop_latches=True)
     estop(bench, True)

@@ -199,7 +199,7 @@ def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
 ) -> None:
     """A command whose stamp is too old, or too far in the future, is refused.
 
-    The refusal contains the age of the stamp, and says that the computers' clocks must agree.
+    The refusal contains the stamp's age, and says that the clocks must agree.
     """
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion interlock: when a robot may move after the motion monitor has stopped it.
+"""Tests of the motion interlock: when a robot that did not move as commanded may move again.
 
-The motion monitor stops a robot that does not move as commanded.
+The motion monitor has stopped this robot.
 """
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
@@ -26,10 +26,7 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """The motion monitor stops the robot, and a sender continues to send motion commands.
-
-    All of them are refused, because the sender never pauses for as long as the command timeout.
-    """
+    """After a stop by the motion monitor, commands are refused until they pause for the timeout."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -40,7 +37,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
     """After a stop by the motion monitor, a pause in the commands ends the refusal of motion.
 
-    The pause is as long as the command timeout, counted from the last command.
+    It is as long as the command timeout, counted from the last command.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -78,7 +75,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A stop by the motion monitor is a first stop if the last one was more than a minute ago.
+    """A stop by the motion monitor, more than a minute after the last, is a first stop.
 
     After a first stop, ~/start is not needed. A stop after a call of ~/start is a first stop too.
     """
@@ -95,8 +92,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
     """On a board without ~/start, a release of the e-stop ends the refusal after a second stop.
 
-    The motion monitor has stopped the robot twice within a minute. A release between the two stops
-    does not help.
+    Both stops were within a minute. A release between them does not help.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

@@ -2,8 +2,7 @@
 
 """Tests of the motion rule: only a fresh command moves the robot, and only while data arrives.
 
-A command is fresh if it is younger than the timeout, and arrived after the last interruption, such
-as a pause of the board.
+A fresh command is younger than the timeout, and newer than the last interruption, such as a pause.
 """
 
 import contextlib
@@ -63,9 +62,9 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """While the board's data is lost, the board restarts and another program starts it.
+    """A restart that only the counters in the board's frames show discards the current command.
 
-    Only the counters in its frames show the restart. The driver discards the current command.
+    Another program starts the board while its data is lost.
     """
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
@@ -87,7 +86,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
     """The driver sends no motion frame to a board that boots after a restart.
 
-    Such a board is paused, and could read a byte of a motion frame as the letter S (start).
+    The paused board could read a byte of the frame as the letter S (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
@@ -118,9 +117,9 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """The board is silent or paused. Motion commands are refused and not sent.
+    """Motion commands are refused and not sent while the board is silent or paused.
 
-    A paused board would read a byte 0x52 of a motion command as the letter R, and reset.
+    A paused board would read a byte 0x52 as the letter R, and reset.
     """
     bench = Bench(run=False)
     bench.open()

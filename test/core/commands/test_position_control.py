@@ -87,8 +87,8 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
     """The robot turns to a goal by less than half a turn, also after several full turns.
 
-    The driver converts the goal's heading to the equivalent one that is nearest to the board's
-    heading, which counts full turns.
+    The board's heading counts full turns, so the driver uses the nearest equivalent heading of the
+    goal.
     """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
@@ -151,10 +151,9 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """The driver refuses goals while the board's pose is not known, or not used.
+    """The driver refuses goals while the board's pose is unknown or unused.
 
-    Without this pose, the driver cannot convert a goal from the odometry frame to the board's
-    frame.
+    A goal in odom must be converted to the board's frame.
     """
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
@@ -200,9 +199,9 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot drives to a goal. An event such as a reset or an e-stop discards this goal.
+    """A goal that an event such as a reset or an e-stop has discarded is not driven later.
 
-    The robot then stays at rest until a new goal arrives.
+    The robot rests until a new goal arrives.
     """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
@@ -237,9 +236,9 @@ def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) ->
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """A reset of the odometry discards the goal of the drive, and the driver sends the Stop frame.
+    """A reset of the odometry during a drive to a goal discards the goal, and Stop is sent.
 
-    A velocity frame with zeros (mode 1) would be a goal at the origin.
+    A velocity frame with zeros would be a goal at the origin.
     """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
@@ -256,7 +255,7 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 def test_a_new_scale_of_odom_discards_a_goal(bench: Bench, scale: str) -> None:
     """A new scale of odom discards the goal of the drive, with a notice; the next goal is accepted.
 
-    With the new scale, the goal would be at another place of the board's frame.
+    The goal would be at another place of the board's frame.
     """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(0.2)
@@ -280,7 +279,7 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 ) -> None:
     """A robot that drives away from its goal is stopped, and a notice names the board's switch.
 
-    With the switch at velocity control, the board takes the goal for a velocity.
+    At velocity control, the board takes a goal for a velocity.
     """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()

@@ -26,9 +26,9 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """If the e-stop is latched while the commanding topic changes, only the e-stop is sent.
+    """An e-stop during a change of the commanding topic is sent alone.
 
-    The change needs a Stop and the new topic's command. Neither of them is sent.
+    The change's Stop and the new topic's command are not sent.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -41,7 +41,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
     """The e-stop is sent twice without delay, just after a command, and then repeated without end.
 
-    Each time, ES and Stop are sent, because some firmware does not know ES.
+    Each is ES and Stop, because some firmware does not know ES.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

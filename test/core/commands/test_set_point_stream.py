@@ -75,9 +75,9 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """After a command has expired, the driver sends Stop at 20 Hz.
+    """After a command has expired, the driver sends Stop at 20 Hz, for 1 s or 5 s.
 
-    It does so for 1 s if data shows that the robot is at rest, otherwise for 5 s.
+    1 s is enough if data shows that the robot is at rest.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
@@ -125,8 +125,7 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 ) -> None:
     """After a letter, such as S (start), during a drive, the command is sent again.
 
-    Zeros precede the letter, and may complete a broken frame to a wrong command. The repeated
-    command replaces the wrong one.
+    Zeros before the letter may complete a broken frame to a wrong command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -150,10 +149,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """A motion can have a new frame each time, for example during a ramp.
-
-    The driver sends these frames at the pace of new commands: one every 18 ms.
-    """
+    """A motion with a new frame each time, such as a ramp, is sent at the pace of 18 ms."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]
@@ -191,7 +187,7 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """After a command has expired, another topic's command is sent at once, without a second Stop."""
+    """After a command has expired, another topic's command is sent without a second Stop."""
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)
@@ -250,7 +246,7 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
 ) -> None:
     """In any order of commands, stops, e-stops and releases, only fresh commands are sent.
 
-    No commands are sent during an e-stop, and a Stop lies between the commands of two topics.
+    None is sent during an e-stop, and a Stop lies between the commands of two topics.
     """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""

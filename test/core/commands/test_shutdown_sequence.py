@@ -21,10 +21,9 @@ def bench() -> Bench:
 def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
-    """At shutdown, the driver always writes Stop three times first.
+    """At shutdown, the driver first writes Stop three times, then what ``on_exit`` demands.
 
-    Then it writes Stop and the letter for a pause or a reset, if the setting ``on_exit`` demands
-    one.
+    For a pause or a reset, this is Stop and its letter.
     """
     assert bench.last_words(on_exit) == 3 * STOP + expected
 

@@ -32,7 +32,9 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 class Bench:
     """A session with both simulated boards.
 
-    ``hears``: channels on which bytes from the driver reach the robot. ``speaks``: the reverse.
+    ``hears``: channels on which bytes from the driver reach the robot.
+
+    ``speaks``: channels on which bytes from the robot reach the driver.
 
     ``read_s``: time in s between two reads of the driver.
     """

@@ -59,10 +59,7 @@ def test_without_angles_a_command_is_refused_because_of_the_front_board() -> Non
 
 
 def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
-    """The computer is busy. The driver reads nothing for 0.1 s, but its timers still run.
-
-    The refusal of a command names the computer, and not the front board.
-    """
+    """If the busy driver reads nothing for 0.1 s, a refusal blames the computer."""
     bench = nominal()
     bench.run(0.1)
     bench.read_s = 0.1
@@ -77,9 +74,9 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """After a pause of 80 ms, the driver blames the front board only when it has read its port.
+    """After a pause of 80 ms, a refusal names the computer until the front board's port is read.
 
-    Until then, the refusal of a command names the computer.
+    The driver reads its two ports one after the other.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}
@@ -100,8 +97,7 @@ def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
 def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
     """A late read does not hide that the front board is silent.
 
-    A refusal names the computer while the reads are late, and the front board as soon as they are
-    in time.
+    A refusal names the computer at first, and the front board after the first read in time.
     """
     bench = nominal()
     bench.run(0.1)

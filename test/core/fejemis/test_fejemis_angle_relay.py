@@ -46,9 +46,9 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """The checksum detects the loss of two characters of an angle, except for some angles with a 6.
+    """The checksum detects the loss of two characters, except for an angle to the right with a 6.
 
-    These angles are to the right. Then the board reads a wrong angle of 0° to 10° to the left.
+    Then the board reads an angle that is 0° to 10° to the left.
     """
     across = 0
     for angle_deg in EVERY:
@@ -67,7 +67,7 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 ) -> None:
     """From an angle with a checksum that lost one or two characters, no different angle is read.
 
-    This is true even for a board that parses lines in the most tolerant way.
+    This is true even for the most tolerant parser.
     """
     text = relayed(angle_deg)
     data = line(text, sums=True)
@@ -79,7 +79,7 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
     """The text of an angle from −60° to −69° contains ``-`` and ``6``, in whatever form.
 
-    Their codes add up to 99, and the checksum is a sum modulo 99, so it misses the loss of both.
+    Their codes add up to 99, so the checksum, modulo 99, misses the loss of both.
     """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
@@ -107,7 +107,7 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
     """From a line without a checksum that lost up to three characters, no angle beyond 90° is read.
 
-    Beyond 90°, the inner wheel would be faster than the outer one.
+    Beyond 90°, the inner wheel would be faster.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
@@ -124,13 +124,10 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """For any sequence of angles, the board reads no angle beyond 90°.
+    """For any sequence of angles, the board reads no angle beyond 90°, even after a loss.
 
-    The driver adds the rounding error of each angle to the next one. The limit also holds after a
-    loss:
-
-    * With a checksum: of any two characters whose loss the checksum does not detect.
-    * Without a checksum: of any one character.
+    * With a checksum: of two characters, if the checksum does not detect the loss.
+    * Without a checksum: of one character.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):
@@ -144,7 +141,7 @@ def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
 def test_rounding_errors_near_90_degrees_are_not_lost() -> None:
     """Near 90°, no relayed angle exceeds 90°, and the mean of the angles is right.
 
-    A rounding error that cannot be added to the next angle is added to a later one.
+    A rounding error may be added to a later angle.
     """
     relay = AngleRelay()
     told = [float(relay.text(math.radians(89.7), sums=False)[4:]) for _ in range(200)]

@@ -43,9 +43,9 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """The user has set values. The driver writes each to the board that uses it, and reads it back.
+    """The driver writes each of the user's values to its board, and reads it back.
 
-    After a restart of the boards, the driver writes all values again.
+    After a restart of the boards, it writes all values again.
     """
     from omnibot_driver.simulator.fejemis import Firmware
 
@@ -83,10 +83,9 @@ def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """The line ``confs`` contains track width and wheelbase, but their order is not known.
+    """A comparison of ``confs`` with ``conf`` shows the order of track width and wheelbase.
 
-    The line ``conf`` contains the track width too. By comparing both lines, the driver finds the
-    order.
+    ``confs`` contains both, and ``conf`` the track width.
     """
     for turned in (False, True):
         configuration = Configuration("drive", {})
@@ -113,7 +112,7 @@ def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_no
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
     """The driver uses a geometry only after the board has reported it twice in a row.
 
-    One report is not enough, because 1 in 99 damaged lines passes its checksum.
+    1 in 99 damaged lines passes its checksum.
     """
     configuration = Configuration("drive", {})
     for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
@@ -162,7 +161,7 @@ def test_a_small_change_by_the_user_is_written() -> None:
 def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
     """A line that changes a radius by 0.3 mm and is damaged on its way is written again.
 
-    The four decimals of the radius that the board reports show that the change is missing.
+    The board reports radii with four decimals, enough to notice this.
     """
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
@@ -195,10 +194,7 @@ def test_a_small_change_whose_line_is_damaged_is_written_again() -> None:
 def test_a_number_counts_as_written_if_only_the_boards_rounding_hides_it(
     text: str, *, agrees: bool
 ) -> None:
-    """The board prints a value with more or fewer decimals than the user has set.
-
-    The value counts as written if rounding alone explains the difference. Otherwise, it does not.
-    """
+    """A value counts as written if only the board's rounding changes it."""
     configuration = Configuration("drive", {Written.WHEELS: (0.07724, 0.07776, 19.0, 68.0, 0.4)})
     configuration.due(0.0, stands=True)
     for _ in range(2):
@@ -280,7 +276,7 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """Motion is refused until the board has all settings that the user has set.
 
-    The driver does not repeat the lost line of a setting while the robot is driven.
+    A lost line of a setting is not repeated during a drive.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

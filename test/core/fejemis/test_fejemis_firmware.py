@@ -31,9 +31,9 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """The boards send help text, and report that they do not know a line that they have received.
+    """Help text and reports of unknown lines do not disturb the robot.
 
-    The robot still obeys commands. The diagnostics show the unknown line.
+    The diagnostics show the unknown line.
     """
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
@@ -44,10 +44,7 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
 
 
 def test_the_diagnostics_show_the_latest_unknown_lines() -> None:
-    """The drive board receives four lines that it does not know, and then the first one again.
-
-    It reports each of these lines. The diagnostics show the latest three, without repetitions.
-    """
+    """The diagnostics show the latest three unknown lines, without repetitions."""
     bench = nominal()
     bench.robot.receive(b"wa\nwb\nwc\nwd\nwa\n", bench.now, DRIVE)
     bench.run(0.1)
@@ -78,8 +75,7 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
 def test_a_slower_subscription_of_another_program_is_replaced(channel: int, text: bytes) -> None:
     """The driver replaces another program's slower subscription to a stream that driving requires.
 
-    Regression: an angle every 100 ms blocked all motion until a reconnect, and a pose every 200 ms
-    slowed the odometry.
+    Regression: an angle every 100 ms blocked all motion, a pose every 200 ms slowed the odometry.
     """
     bench = nominal()
     bench.robot.receive(with_sum(text) + b"\n", bench.now, channel)

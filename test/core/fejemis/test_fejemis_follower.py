@@ -71,7 +71,7 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
     """After a fault of the front wheel, motion is refused until the wheel has moved.
 
-    Otherwise, each new command would move the robot for 1 s, until the fault is noticed again.
+    Each new command would otherwise move the robot for 1 s.
     """
     follower = Follower()
     at = blocked(follower, 0.0)
@@ -117,8 +117,8 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The driver stops a robot whose firmware limits the front wheel to 90° in reverse.
 
-    Such a robot turns instead of reversing. A notice names ``allow_reverse``. After the second
-    stop, motion is refused until ~/start.
+    Such a robot turns, and a notice names ``allow_reverse``. After the second stop, motion is
+    refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)

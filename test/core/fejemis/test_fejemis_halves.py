@@ -213,10 +213,10 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
     ids: tuple[int, int], speaks: set[int], *, estop: bool
 ) -> None:
-    """If the two boards do not form a pair, the driver soon repeats Stop less often.
+    """If one board is silent or both are drive boards, Stop is repeated less often after 5 s.
 
-    One board is silent, or both are drive boards. After at most 5 s, Stop comes only with each try
-    to start the boards, twice a second; during an e-stop, 20 times a second.
+    It then comes with each try to start the boards, twice a second; during an e-stop, 20 times a
+    second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks
@@ -257,10 +257,7 @@ def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
 
 @pytest.mark.slow
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """The cables of the two boards are exchanged while the ports are closed.
-
-    After each reconnect, the driver finds out which board is at which port, and drives the robot.
-    """
+    """After each exchange of ports, the driver finds out which board is where, and can drive."""
     bench = nominal()
     for swapped in (True, False, True):
         bench.close()
@@ -296,7 +293,7 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
     """After the boards have exchanged ports, the drive board's stamps still use its own clock.
 
-    The front board's clock is ahead of the drive board's clock by ``ahead_s``, in s.
+    ``ahead_s``: time by which the front board's clock is ahead, in s.
     """
     bench = Bench()
     bench.robot.front._restart(ahead_s)

@@ -21,9 +21,9 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 
 LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
-"""Time in s after which the driver knows which comes first: the gyro line or the acceleration line.
+"""Time in s after which the driver knows whether the gyro line or the acceleration line is first.
 
-This time is long enough if reads are at most 100 ms apart.
+Valid for reads at most 100 ms apart.
 """
 
 
@@ -126,7 +126,7 @@ def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[flo
 def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -> list[Read]:
     """Divide the lines into the reads of a fast host that is busy at times, for up to 0.15 s.
 
-    ``stalls``: probability that the host is busy before it reads a line.
+    ``stalls``: probability that it is busy before a line.
     """
     reads: list[Read] = []
     free_at = 0.0
@@ -280,13 +280,13 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lost, repeated and late lines are paired with lines of another sample only in one case.
+    """Lost, repeated and late lines give false pairs only where the stream shows no mistake.
 
-    In this case, one line is read late, the other one less than 5 ms later, and no pose follows in
-    the same read. The stream does not show the mistake.
+    There, one line is late, the other comes less than 5 ms later, and no pose follows in the same
+    read.
 
-    ``period_s``: period of the reads in s; None if each line is read at once. Reads with the period
-    of the samples would hide which line of a sample comes first.
+    ``period_s``: period of the reads in s, but not the samples' period; None: each line is read at
+    once.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -301,7 +301,7 @@ def test_no_pair_has_lines_of_two_samples(
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """No sample after a silence of the drive board gets a stamp from before the silence.
 
-    The driver does not publish a sample before the first pose, because its time is unknown.
+    Samples before the first pose have no known time, and are not published.
     """
     bench = nominal()
     for phase_s in (0.0, 0.005, 0.01, 0.015):

@@ -36,8 +36,7 @@ def sampled(arrivals: list[float]) -> list[float]:
 def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken() -> None:
     """Samples that waited for 6 s get their sampling times.
 
-    The newest samples usually show the phase of the sampling times. Here all of them are late, so
-    the phase must stay.
+    All of them are late, so they must not change the phase of the sampling times.
     """
     arrivals = [
         11.0 if 5.0 < 0.01 * number < 11.0 else 0.01 * number + 3e-4 for number in range(1500)
@@ -49,8 +48,7 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
     """Two late samples do not shift the sampling times of the next ones.
 
-    The second one seems to follow a lost sample. The third one would then be 3 ms early, which is
-    impossible, so no sample was lost.
+    The third would be 3 ms early if one were lost, which is impossible.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}
     arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]
@@ -61,8 +59,7 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
     """A sample that seems early cancels only the last of several supposed losses.
 
-    Otherwise the stamps would be several periods too old. Samples are up to 30 ms late, and 10 % of
-    samples and poses are lost.
+    Otherwise the stamps would be several periods too old.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []
@@ -155,7 +152,7 @@ def numbered() -> Bench:
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
     """Return, for each published sample, the cycles of its gyro line and its acceleration line.
 
-    Each is the number of the cycle divided by 1000, from the lines of a bench from ``numbered``.
+    Values of a bench from ``numbered``: the cycle divided by 1000.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
@@ -168,7 +165,7 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
     """The two lines of each published sample come from the same cycle of the board.
 
-    Each read has ten samples. In the cases "lost" and "twice", this happens to 1 % of the lines.
+    Each read has ten samples. In "lost" and "twice", 1 % of the lines is lost or repeated.
     """
     bench = numbered()
     chance = random.Random(5)

@@ -181,7 +181,7 @@ def test_extra_fields_are_left_alone() -> None:
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
     """A line that lost its end is discarded with the next line, as one fault.
 
-    The line after these two is decoded. A line with a wrong checksum is a fault, too.
+    A line with a wrong checksum is a fault, too.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
@@ -224,7 +224,7 @@ def test_the_limit_of_a_line_does_not_depend_on_the_chunking(
 ) -> None:
     """Lines of about 200 characters are decoded in the same way in whatever pieces they arrive.
 
-    The messages and counts are the same as for one piece, even if a line end arrives separately.
+    Even a separate line end does not change messages and counts.
     """
     stream = b"\n".join(lines)
     whole, split = FejemisDecoder(), FejemisDecoder()
@@ -318,8 +318,7 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
     """The decoder soon accepts lines that the firmware prints with other decimals than before.
 
-    It discards the first two as damaged. If the decimals of a kind of line vary all the time, any
-    number of decimals is accepted.
+    The first two are discarded. If a kind of line varies all the time, all forms are accepted.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
@@ -331,12 +330,10 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """Lines with another form than the learnt one are counted in windows of 24 lines of a kind.
+    """The eighth line with another form in a window of 24 lines of a kind is accepted.
 
-    The decoder discards such lines until a window has 8 of them, and then accepts every form. Here,
-    7 at the end of one window and 7 in the next are discarded; the 8th is accepted.
-
-    ``windows``: number of earlier windows without such lines.
+    The first seven are discarded as damaged, also in the next window. ``windows``: number of
+    earlier windows without such lines.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

@@ -48,7 +48,7 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
     """Of a thousand lift voltages or colours within 1 s, only about twenty are sent.
 
-    Each time, the newest one is sent. A voltage of 0 is sent at once.
+    Each is the newest. A voltage of 0 is sent at once.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -71,7 +71,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
     """The time limit of a lift voltage begins when the voltage is sent, not when it is commanded.
 
-    A voltage waits if another one was just sent. Switching the lift off discards it.
+    Switching the lift off discards a waiting voltage.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
@@ -92,7 +92,7 @@ def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
 def test_a_new_lift_voltage_is_not_cancelled_by_the_repeated_switching_off() -> None:
     """A new lift voltage ends the repetition of the line that switches the lift off.
 
-    A repeated line would cancel the new voltage. The brush's line is still sent three times.
+    The line for the brush is still sent three times.
     """
     machine = Machine()
     machine.off()
@@ -184,8 +184,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
     """The last lines of the guard and of the driver stop wheels, brush and lift.
 
-    The guard's lines do so with and without a latched e-stop; the driver's lines are those at its
-    exit.
+    The guard has lines with and without a latched e-stop.
     """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()

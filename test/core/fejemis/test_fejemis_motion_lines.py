@@ -27,10 +27,9 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
-    """Return the numbers of each command that a board with checksums reads from the bytes.
+    """Return the numbers of each command that a lenient board with checksums reads from the bytes.
 
-    The board is lenient: numbers are read as in C, missing numbers are 0, and a checksum may have
-    one digit.
+    Numbers are read as in C, missing numbers are 0, and a checksum may have one digit.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -57,10 +56,9 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """If the manual's example of a motion line loses two characters, its checksum can still fit.
+    """The manual's example of a motion line becomes another motion by the loss of two characters.
 
-    The board then reads another motion. Therefore, the driver commands this motion with other
-    digits.
+    The checksum still fits, so the driver avoids these digits.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
@@ -71,7 +69,7 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
     """From a line that lost one or two characters, the board reads no wrong motion.
 
-    A second line follows: without the line end, the board reads both as one line.
+    If the line end is lost, the board reads this line and the next as one.
     """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
@@ -88,9 +86,9 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 @pytest.mark.slow
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """Random motions are commanded. In each line, the checksum detects any loss of two characters.
+    """In the lines of random motions, the checksum detects any loss of two characters.
 
-    This is so because the driver avoids certain pairs of characters and certain checksums.
+    The driver avoids certain pairs of characters and certain checksums.
     """
     chance = random.Random(7)
     for _ in range(150):
@@ -112,12 +110,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
+    """No false motion is read if a stop line, ``rc 2 0 0``, and the next line lose two characters.
 
-    A line begins with a semicolon and its checksum. Without the line end and this semicolon, the
-    board reads the two lines as one. If, for example, the next line's checksum is 92, the board
-    reads the motion ``rc 2 0 092``, and no checksum shows the damage. Therefore, the driver sends
-    an empty line before such a next line.
+    The driver writes an empty line between them. Otherwise the next line's checksum, for example
+    92, could become a number: ``rc 2 0 092``.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -148,7 +144,7 @@ def test_what_three_lost_characters_leave() -> None:
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
     """The angle in the front board's line is right within 0.02°, and a small angle within 1 %.
 
-    The speed of the outer wheel in the drive board's line is right within 0.6 %.
+    The outer wheel's speed in the drive board's line is right within 0.6 %.
     """
     if v == w == 0.0:
         return
@@ -166,7 +162,7 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     """The outer wheel reaches every speed within 1.8 %, although the lines avoid certain digits.
 
-    Negative speeds are the least exact: beside a minus sign, the digit 6 is avoided too.
+    Lines with a minus sign avoid the digit 6, too.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.12**n for n in range(60))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -179,7 +175,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """A lift line that lost one or two characters drives the lift no harder and no longer.
 
-    The line commands 45 to 100 % of the requested voltage. The direction stays the same.
+    The line commands 45 to 100 % of the requested voltage.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -228,11 +224,6 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
     """Without a checksum, only the loss of a point or a digit makes the outer wheel faster.
 
     Only the loss of the minus sign reverses the wheel. One character of the line is lost.
-    :
-    No false motion is read if a stop line, ``rc 2 0 0``, and the next line lose two characters.
-
-    An empty line between them prevents ``rc 2 0 092``: the 92 would be the next line's checksum,
-    without the line end and the semicolon before it.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):

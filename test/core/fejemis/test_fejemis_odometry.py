@@ -169,8 +169,7 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 ) -> None:
     """If another program sends ``enc0`` during a drive, ``odom`` does not jump.
 
-    Regression: near the old origin, the odometry went back by the whole distance, with a standard
-    deviation of a few millimetres.
+    Regression: near the old origin, the odometry went back by the whole distance.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.0)
@@ -209,8 +208,8 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
     """With reads every 0.15 s, ``odom`` does not jump if another program sends ``enc0``.
 
-    Regression: the age of wheel speeds was measured by their arrival, so the first pose of a read
-    had none.
+    Regression: the first pose of a read had no wheel speeds, because their age came from their
+    arrival.
     """
     bench = nominal()
     bench.drive_on(0.5, 0.3, 0.6)
@@ -238,9 +237,9 @@ def test_a_pose_set_to_zero_at_rest_does_not_move_the_odometry() -> None:
 
 
 def test_a_pose_with_coarse_digits_is_no_new_frame() -> None:
-    """A board prints its pose in steps of 0.1 m. The odometry follows it, step by step.
+    """The odometry follows a pose that the board prints in steps of 0.1 m.
 
-    Each step contradicts the wheel speeds, but the board's frame has not moved.
+    The steps contradict the wheel speeds, but the board's frame has not moved.
     """
     drive = Drive()
     for _ in range(400):
@@ -255,7 +254,7 @@ def test_a_pose_with_coarse_digits_is_no_new_frame() -> None:
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
     """The normalised squared error (NEES) of the odometry is about 3 on average over fifty drives.
 
-    The random errors of slip and wheel sizes have the standard deviations of the noise settings.
+    The random errors of slip and wheels agree with the noise settings.
     """
     noise = OdometryNoise(wheels=WHEELS)
     squares = []
@@ -325,9 +324,9 @@ def figure_eight(bench: Bench, speed: float = 0.8, radius_m: float = 0.8) -> Non
 
 @pytest.mark.slow
 def test_a_figure_eight_with_losses_both_ways_ends_where_it_is() -> None:
-    """The robot drives a figure eight of 10 m. In each direction, 1 character in 1000 is lost.
+    """After a figure eight of 10 m, the odometry is right within 0.1 m and 2°.
 
-    At the end, the odometry is right within 0.1 m and 2°.
+    In each direction, 1 character in 1000 is lost.
     """
     chance = random.Random(1)
     bench = nominal(Simulated(seed=1, lose_inbound=1e-3))

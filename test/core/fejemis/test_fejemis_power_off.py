@@ -55,7 +55,7 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
     """A ~/start makes a pending power off of silent boards fail, but is not confirmed itself.
 
-    The boards have sent nothing since the call. ``closes``: whether the ports close right after it.
+    ``closes``: whether the ports close right after the call.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -135,9 +135,9 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """The drive board restarts between two connections, so it has forgotten the power off.
+    """A power off is forgotten if the drive board restarts between two connections.
 
-    The board's clock shows the restart to the driver. So the driver accepts motion again.
+    The board's clock shows the restart, and the driver accepts motion again.
     """
     bench.run(1.5)
     bench.close()
@@ -158,8 +158,7 @@ def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_ot
 ) -> None:
     """A power off is forgotten if both boards restart unseen and come back at exchanged ports.
 
-    The driver compares the time of each board with its earlier time at any port, so it notices both
-    restarts.
+    The driver compares the clock of each board across the ports.
     """
     bench.close()
     bench.speaks = set()
@@ -278,7 +277,6 @@ def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
 ) -> None:
     """The delay of a power off is such that the checksum detects the loss of any two digits.
 
-    For example, ``off 300`` without its 3 and one 0 would have a fitting checksum and a shorter
-    delay.
+    ``off 300`` without 3 and 0 would have a fitting checksum.
     """
     assert whole_seconds(wanted_s) == seconds

@@ -2,7 +2,7 @@
 
 """Tests of boards that restart: short and long boots, with or without the start line.
 
-A board sends the start line at the end of its boot. The host reads at several intervals.
+A board sends this line at the end of its boot.
 """
 
 import contextlib
@@ -38,9 +38,9 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 
 
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
-    """One read contains a pose from before a restart, and then the line that reports the restart.
+    """If one read contains a pose and then the report of a restart, the pose is handled first.
 
-    The driver handles the pose first, and then resets the board's clock.
+    The board's clock is reset after it.
     """
     bench = nominal()
     drive = bench.robot.drive
@@ -62,7 +62,7 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
     """The odometry does not jump if the drive board restarts at any time between two reads.
 
-    A read of 20 ms may contain poses from before and from after the restart.
+    A read may contain poses from before and from after the restart.
     """
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
@@ -86,10 +86,9 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A restart of a board during a slow drive is reported and stops the robot.
+    """A restart of a board during a slow drive is reported, and stops the robot.
 
-    The last command is still valid. Without the line that reports a restart, the driver detects the
-    restart from the times in the board's other lines.
+    Without the line that reports it, the times in the board's other lines show it.
     """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
@@ -117,7 +116,7 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 ) -> None:
     """A restart while the port is away is detected, and the odometry does not jump.
 
-    The board's uptime may be shorter or longer than before the restart, after ``away_s`` seconds.
+    After ``away_s`` seconds, the uptime is shorter or longer than before.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -140,8 +139,7 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
     """A restart while the port is away is detected despite a stall, and the odometry does not jump.
 
-    The board's small time after the restart looks like late lines. The stall does not explain them:
-    it ended before the port was back.
+    The stall ended before the port was back, so it does not explain the board's small time.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)
@@ -186,7 +184,7 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
     """Restart a board while motion is commanded; return the reasons why commands were refused.
 
-    Also check that the robot drives again only after the driver has configured the front board.
+    Also check that the robot first drives after the front board is configured.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)
@@ -250,10 +248,9 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """A board was silent, so the driver does not know whether it has restarted.
+    """After a silence, the state becomes ``nominal`` only after a heartbeat of the board.
 
-    The state does not become ``nominal`` before a heartbeat of the board has answered this
-    question.
+    The heartbeat shows whether the board has restarted.
     """
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
@@ -270,7 +267,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
     """After a board was silent, the driver requests its heartbeat ten times a second.
 
-    Without requests, heartbeats come only every 0.4 s, and the driver learns late of a restart.
+    Unrequested, it comes every 0.4 s, and a restart is noticed late.
     """
     bench = nominal()
     bench.speaks = {DRIVE}

@@ -67,7 +67,7 @@ def test_the_biases_are_subtracted_from_both_imu_topics() -> None:
 
 @pytest.mark.slow
 def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
-    """The first orientations after a reconnect have the turn rate of the robot, now at rest.
+    """The first orientations after a reconnect have a turn rate of about zero if the robot rests.
 
     Before the port was lost, the robot turned at 1 rad/s.
     """

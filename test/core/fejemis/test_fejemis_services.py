@@ -76,7 +76,7 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """A calibration that leaves the offsets unchanged fails, because its commands were lost.
+    """A calibration whose commands are lost fails, because the offsets stay unchanged.
 
     Sensor noise changes the offsets a little in every real calibration.
     """
@@ -297,11 +297,7 @@ def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None
 
 @pytest.mark.slow
 def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
-    """Both boards load their saved values (``eer``), and one of them restarts meanwhile.
-
-    Afterwards, neither board has the user's settings. So the driver writes the settings to both
-    boards again.
-    """
+    """If one board restarts while both load saved values, both get the settings again."""
     wheels = (0.08, 0.08, 9.7, 48.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: wheels}))
     bench.run(2.0)
@@ -317,7 +313,7 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 def test_loading_stops_the_robot_before_it_loads() -> None:
     """A request to load the configuration during a drive first stops the robot.
 
-    ``eer``, the command to load, is sent only after the robot has had time to stop.
+    ``eer``, the command to load, waits until the robot has had time to stop.
     """
     bench = nominal()
     bench.drive_on()
@@ -334,8 +330,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
     """A shutdown ends the job of loading with a failure that names the shutdown.
 
-    Then the driver sends only stop commands and angles of the front wheel. A setting that still
-    waits is not written.
+    Then only stop commands and angles of the front wheel are sent, and no waiting setting.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

@@ -18,9 +18,9 @@ def true_pose(bench: Bench) -> Pose:
 
 
 def unread(bench: Bench, seconds: float, *, room: int) -> dict[int, bytes]:
-    """Let time pass in which the driver reads nothing. Return what waits for it, by channel.
+    """Let time pass without reads; return the first ``room`` bytes of each board, by channel.
 
-    Of each board's bytes, only the first ``room`` are kept. Later bytes are lost.
+    Later bytes are lost.
     """
     held = {DRIVE: b"", FRONT: b""}
     for _ in range(round(seconds / bench.robot.tick_s)):
@@ -33,7 +33,7 @@ def unread(bench: Bench, seconds: float, *, room: int) -> dict[int, bytes]:
 def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> None:
     """Let the driver stall; then let it read the first ``room`` bytes that each board sent.
 
-    ``noticed``: whether the driver notices the stall. If not, only the reads were late.
+    ``noticed``: whether the driver notices the stall, or only late reads.
     """
     held = unread(bench, stall_s, room=room)
     if noticed:
@@ -58,8 +58,8 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The odometry contains the whole motion of a drive during a stall of the driver.
 
-    After an unnoticed stall, lines that are more than 1 s late are rejected. The first displacement
-    then covers seconds, the next one 20 ms, and neither is implausible.
+    After an unnoticed stall, the first displacement covers seconds, because lines over 1 s late are
+    rejected. It is still plausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -79,7 +79,7 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
     """After a stall, all samples in the terminal's buffer are published with their sampling times.
 
-    The buffer has room for the lines of 0.37 s, or for all lines.
+    The buffer holds the lines of 0.37 s, or all lines.
     """
     bench = nominal()
     bench.run(1.0)
@@ -97,8 +97,7 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """After a stall and a second late read, the published samples have their sampling times.
 
-    Bytes are lost between the two reads. Only a sample between them and the next pose is not
-    published.
+    Bytes are lost between the reads. Only a sample between them and the next pose is not published.
     """
     bench = nominal()
     bench.run(1.0)

@@ -17,10 +17,7 @@ from omnibot_driver.core.readings import ImuReading
 
 
 def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
-    """The times of two readings differ only by the smallest amount that a float can represent.
-
-    The driver increases the second stamp: it is 1 µs after the first stamp.
-    """
+    """If two stamps differ only by the smallest amount of a float, the second is 1 µs later."""
     stamped = StampedReadings()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     for stamp_s in (50_000.0, 50_000.000000000007):
@@ -35,8 +32,7 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
     """Stamps of a kind increase in nanoseconds, even if a restart of the boards is read late.
 
-    One read contains the lines of up to 0.5 s. The first lines after the restart all have the time
-    of the read, apart from rounding errors.
+    The first lines after such a restart all have the time of the read.
     """
     chance = random.Random(seed)
     bench = Bench()

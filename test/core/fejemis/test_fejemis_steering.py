@@ -102,7 +102,7 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 ) -> None:
     """The body is not faster than commanded while the front wheel has not reached its angle.
 
-    The tolerance is the effect of an error of 5° in the wheel's angle.
+    Tolerance: the effect of 5° at the wheel.
     """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
@@ -164,7 +164,7 @@ COMMANDS = [
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
     """After 2.5 s, the robot has the commanded speed and turn rate.
 
-    Tolerances: 1.2 % of the outer wheel's speed, and 3 % of this speed divided by the track width.
+    Tolerances: 1.2 % of the outer wheel's speed; 3 % of it, divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -191,7 +191,7 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
     """A robot whose front wheel points ahead does not roll away when a turn on the spot begins.
 
-    Without the wait for the front wheel, it would roll 0.17 m.
+    The driver waits for the wheel; otherwise the robot would roll 0.17 m.
     """
     bench = nominal()
     for _ in range(12):
@@ -218,9 +218,9 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
-    """The front wheel overshoots to 95°. The driver relays at most 90° to the drive board.
+    """If the front wheel overshoots to 95°, the driver relays at most 90° to the drive board.
 
-    At 95°, the board would turn its inner wheel faster than the outer one.
+    Beyond 90°, the board would turn its inner wheel faster.
     """
     bench = nominal()
     angles_deg = [60.0]
@@ -254,9 +254,8 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
     """A reverse command that the driver has set to zero is not driven later.
 
-    It was accepted as a zero command while motion was refused until ~/start and ``allow_reverse``
-    was off. After the user sets ``allow_reverse``, the robot stays at rest, and the next reverse
-    command is refused.
+    * After the user has set ``allow_reverse``: the robot stays at rest.
+    * The next reverse command: refused until ~/start.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):
@@ -276,9 +275,9 @@ def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
-    """The user commands a curve backward, and the robot follows it.
+    """The robot follows a curve backward with a firmware that mirrors the front wheel's angle.
 
-    In this firmware, the front wheel has the same angle in a curve backward as in a curve forward.
+    The angle is the same as in a curve forward.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)

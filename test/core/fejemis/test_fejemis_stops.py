@@ -21,8 +21,7 @@ def without_relays(lines: list[str]) -> list[str]:
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
     """An e-stop stops both boards, but its release sends ``start`` to the drive board only.
 
-    The driver sends Stop before ``start``, because some firmware resumes the old motion command
-    after ``start``.
+    Stop comes first, because some firmware resumes the old motion after ``start``.
     """
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
@@ -106,8 +105,7 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 def test_a_pause_survives_a_reconnect_and_the_release_of_an_estop() -> None:
     """A pause continues after a reconnect and after the release of an e-stop, until ~/start.
 
-    The pause was requested during the e-stop, and the front board's port was lost. The release does
-    not send the line ``start``.
+    The release does not send the line ``start``.
     """
     bench = nominal()
     bench.estop(True)
@@ -141,7 +139,7 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
     """The refusal of motion without data says at first only that nothing was read from the boards.
 
-    A few seconds later, late reads are excluded, and it says that the boards send no data.
+    A few seconds later, it says that the boards send no data.
     """
     bench = nominal()
     bench.drive_on()
@@ -159,8 +157,8 @@ def assert_the_estop_is_the_answer_and_the_pause_continues(
 ) -> None:
     """Check that ``answer`` is a failure because of the e-stop, and that the pause continues.
 
-    After the release of the e-stop, the robot stays paused until the next ~/start. The driver sends
-    no line ``start`` in between, from the time ``mark`` (in s) on.
+    No line ``start`` is sent from the time ``mark`` (in s) until the next ~/start, although the
+    e-stop is released.
     """
     assert not answer.success
     assert "release it with ~/estop" in answer.message
@@ -205,8 +203,7 @@ def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None
 def test_a_start_of_a_driven_robot_interrupts_its_motion_only_for_a_moment() -> None:
     """A ~/start during a drive interrupts the motion only for a moment.
 
-    The driver sends Stop, ``start`` and the motion command at once. The regular repetition of the
-    command comes only once a second here.
+    The motion command follows ``start`` at once, before its regular repetition.
     """
     bench = nominal(commands=CommandSettings(timeout_s=60.0, rate_hz=1.0))
     bench.drive()

@@ -19,10 +19,7 @@ from omnibot_driver.core.readings import ExtraReading, ImuReading
 
 
 def late(chance: random.Random) -> float:
-    """Return a random delay of a read, in s.
-
-    Usually, the delay is about 0.36 ms. For 1 % of the reads, it is up to 20 ms longer.
-    """
+    """Return a random delay of a read, in s: about 0.36 ms; in 1 % of cases, up to 20 ms more."""
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 
@@ -39,7 +36,7 @@ def within(errors: list[float]) -> float:
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
     """The stamps of late and lost lines have small errors, apart from a constant delay.
 
-    99 % of the errors are below 0.05 ms for poses, and below 0.2 ms for IMU samples.
+    99 % are below 0.05 ms for poses, and below 0.2 ms for IMU samples.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
@@ -94,7 +91,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
     """The clock notices that a board has restarted soon after its start.
 
-    The board's time falls by only 0.6 s, so the new lines look almost like late lines.
+    The board's time falls by only 0.6 s, as if the new lines were late.
     """
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
@@ -110,8 +107,7 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
     """A clock that began with a late line becomes right, and rejects at most three lines meanwhile.
 
-    Lines with less delay seem too early at first. Each later read brings two lines, sent 20 ms
-    apart.
+    Lines with less delay seem too early at first. Later reads have two lines each.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -127,8 +123,7 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
     """Damaged times that are 0.1 s too large, every third time, do not move the clock.
 
-    They agree with each other, but a correct, smaller time follows each of them, so they are no
-    jump.
+    A correct, smaller time after each of them shows that the board's time has not jumped.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -143,7 +138,7 @@ def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
 def test_rare_reads_lose_no_odometry(seed: int) -> None:
     """No odometry and no IMU sample is lost if the driver reads each port only every 50 ms.
 
-    ``seed`` varies how long the robot runs before the driver connects, and the phase of the reads.
+    ``seed`` varies the time before the connection, and the phase of the reads.
     """
     bench, chance = Bench(), random.Random(seed)
     for _ in range(chance.randrange(2000)):
@@ -178,8 +173,7 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
     """Stamps of extra readings must increase only within a kind.
 
-    The earlier stamp of the second reading, of another kind, stays. The third reading has the kind
-    and the stamp of the first, so its stamp is made later.
+    An earlier stamp of another kind stays; an equal stamp of the same kind becomes later.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -190,7 +184,7 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
     """Old lines that waited before the port was opened are not regarded as a restart.
 
-    The clock follows the jump of the board's time after them. A restart would set the time back.
+    The board's time then jumps ahead, and the clock follows.
     """
     clock = TeensyClock()
     for n in range(20):

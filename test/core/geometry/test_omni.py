@@ -42,8 +42,7 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 ) -> None:
     """The body twist is computed from wheel rates with the odometry matrix of the manual.
 
-    The manual's form with the factor 1/(2 cos 30°) is right. Its multiplied form is wrong: the
-    velocity along x is only 3/4 of the true one.
+    Only the manual's form with 1/(2 cos 30°) is right; the other gives 3/4 of the velocity along x.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
@@ -92,7 +91,7 @@ def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
     """In a left turn at 1 rad/s, each rim moves at -L m/s, where L is the base radius in m.
 
-    The manual calls the right turn, with all wheels forward, «rotate all».
+    The right turn is the manual's «rotate all».
     """
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

@@ -70,7 +70,7 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
     """If sensor and driver have different ranges, the advice is to set ``accel_range``.
 
-    The measured gravity shows the sensor's range of 2, 4, 8 or 16 g, even with an error of 8 %.
+    An error of 8 % in gravity does not change the advice.
     """
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)

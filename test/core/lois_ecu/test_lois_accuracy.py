@@ -31,9 +31,9 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware)
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """The robot turns in place. The estimated angle is right within 3 %.
+    """After a turn in place, the estimated angle is right within 3 %.
 
-    This is so although the public firmware counts no ticks of the wheel that rolls back.
+    The public firmware counts no ticks of the wheel that rolls back.
     """
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0

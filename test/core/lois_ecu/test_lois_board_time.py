@@ -46,7 +46,10 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """The estimated standard deviation of a read's delay is 5 to 25 ms for reads up to 30 ms late."""
+    """For reads that are up to 30 ms late, the standard deviation of the delay is 5 to 25 ms.
+
+    The driver estimates the delay and its standard deviation.
+    """
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -109,7 +112,7 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """After a jump of the board's clock, the delay of the next tick report is irregular.
 
-    All reads are on time. The delay differs from 0 by the jump: 0.05 s or 0.2 s, ahead or back.
+    The delay differs by the jump, 0.05 s or 0.2 s, from its usual value of 0.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -123,7 +126,7 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
     """If reads are often up to 0.1 s late, one more read that is 0.1 s late is not irregular.
 
-    A read that seems 0.06 s early is irregular, because late reads do not explain it.
+    A read that seems 0.06 s early is irregular.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

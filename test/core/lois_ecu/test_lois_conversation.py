@@ -36,7 +36,7 @@ RPM = math.tau / 60
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     """After the port is opened, the driver configures the board, and the robot can be driven.
 
-    It writes the low-pass gain, the periods of the messages and the gains of the controllers.
+    Configured: low-pass gain, periods of the messages, gains of the controllers.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
@@ -117,8 +117,8 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """A robot whose user has switched the checksums off can be driven.
 
-    Value 4 of command 0x11 does so, and overwrites the left wheel's "short correction", which the
-    driver therefore writes again.
+    The command, 0x11 with 4, also overwrites the "short correction" of the left wheel, which is
+    restored.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver.confirmed:
@@ -177,8 +177,8 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    The test writes 8 RPM backward to the board after a stop from 30 RPM. The firmware still uses
-    the last measured speed, so the wheels get no power without feed-forward.
+    The firmware still uses the last measured speed. Without feed-forward, the wheels then get no
+    power.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -239,8 +239,7 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
     """The tick reports after a record are not regarded as late, even if lines of it are lost.
 
-    The board's clock stops for 0.12 s during the record. If this were ignored, ``odom`` would jump
-    some seconds later.
+    The public firmware's clock stops for 0.12 s during a record; ``odom`` must not jump later.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)

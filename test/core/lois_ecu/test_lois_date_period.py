@@ -2,7 +2,7 @@
 
 """Tests of the period with which the board sends the GPS date, and of requests for one date.
 
-The driver confirms the board's settings by such a request, which ends the periodic dates.
+Such a request confirms the board's settings, and ends the periodic dates.
 """
 
 import pytest
@@ -39,8 +39,7 @@ class DeafBench(Bench):
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """The board has the right period of the date even if one of the lines with the period is lost.
 
-    The driver sends this line several times after a request for one date, which ends the periodic
-    dates.
+    These lines follow a request for one date, which ends the periodic dates.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -54,8 +53,7 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
     """The driver confirms the board's settings, and keeps the user's period of the date.
 
-    The confirmation requests one date, which ends the periodic dates, so the driver sets the period
-    again.
+    The confirmation ends the periodic dates, so the driver sets the period again.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)
