@@ -2,7 +2,7 @@
 
 """How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-This module does not know the frames. All times are in s.
+The frames do not matter. All times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ PACKET: Final = 62
 DRIFT: Final = 1.0002
 """Real period of the adapter's timer, divided by its nominal period.
 
-The timer drifts, so that within 10 s packets end at every position in the board's tick.
+Because of the difference, packets end at every position in the board's tick.
 """
 
 Handed = tuple[float, bytes]

@@ -2,9 +2,12 @@
 
 """A subscriber in its own process: it records each Imu and Odometry until stdin is closed.
 
-Arguments: namespaces. Output: JSON with two arrays for each namespace, with times of the steady
-clock in s. ``heard``: time and acceleration along x of each Imu. ``odometries``: each Odometry, as
-[time].
+Arguments: namespaces. Output: a JSON object with two arrays for each namespace. Times are of the
+steady clock, in s.
+
+``heard``: [time, acceleration along x] of each Imu.
+
+``odometries``: [time] of each Odometry.
 """
 
 import json

@@ -45,8 +45,7 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
     """Run both simulated boards in real time, then send a list of delays in s to ``results``.
 
-    A delay: from the front board's report of an angle to its arrival at the drive board. The wheel
-    swings, so that successive angles differ.
+    A delay lasts from the front board's report of an angle to its arrival at the drive board.
     """
     pair = SimulatedFejemis()
     drive, _ = masters

@@ -13,7 +13,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of a measurement that was made several times, alternately for driver and floor.
+    """The results of repeated measurements, alternately of driver and floor.
 
     ``ours``, ``floor``: the values of driver and floor, in pairs.
 

@@ -27,9 +27,7 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Largest number in an IMU frame.
-
-From frame to frame, the number goes up by 1 from 0 to ``TURN``, then down to 0, and so on.
+"""Largest number in an IMU frame: the number counts from 0 to ``TURN`` and back, again and again.
 """
 NOISE = 997
 """Number of ticks after which the random noise of the gyro and of the acceleration repeats."""

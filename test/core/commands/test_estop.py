@@ -123,10 +123,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """A robot that speeds up after an e-stop does not cause the notice to call ~/reset.
-
-    The notice is for a board that still holds the e-stop.
-    """
+    """A robot that speeds up after an e-stop does not cause the notice to call ~/reset."""
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)

@@ -37,7 +37,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
     """After a stop by the motion monitor, a pause in the commands ends the refusal of motion.
 
-    It is as long as the command timeout, counted from the last command.
+    The pause is the command timeout, counted from the last command.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -77,7 +77,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
     """A stop by the motion monitor, more than a minute after the last, is a first stop.
 
-    After a first stop, ~/start is not needed. A stop after a call of ~/start is a first stop too.
+    A stop after a call of ~/start is a first stop too. After a first stop, ~/start is not needed.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):

@@ -104,7 +104,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
     """After a request for a pause or a reset, the driver sends no motion frame.
 
-    The test loses the request, so the board drives on.
+    The board does not receive the request, and drives on.
     """
     bench.drive(0.4)
     start = len(bench.written)

@@ -116,7 +116,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 def test_what_the_old_scale_rounded_to_nothing_does_not_become_motion() -> None:
     """A speed that the old scale rounded to 0 does not become a motion with the new scale.
 
-    The next command moves the robot, with a ramp from zero.
+    Only the next command moves the robot.
     """
     limits = SpeedLimits(linear_mps2=0.1)
     bench = Bench(BoardSettings(running=True), limits=limits)

@@ -87,8 +87,7 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
     """The robot turns to a goal by less than half a turn, also after several full turns.
 
-    The board's heading counts full turns, so the driver uses the nearest equivalent heading of the
-    goal.
+    The board's heading counts full turns.
     """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
@@ -253,10 +252,7 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 @pytest.mark.slow
 @pytest.mark.parametrize("scale", ["linear_scale", "angular_scale"])
 def test_a_new_scale_of_odom_discards_a_goal(bench: Bench, scale: str) -> None:
-    """A new scale of odom discards the goal of the drive, with a notice; the next goal is accepted.
-
-    The goal would be at another place of the board's frame.
-    """
+    """A new scale of odom discards the current goal, with a notice; the next goal is accepted."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(0.2)
     bench.configure(odometry=bench.settings.odometry)

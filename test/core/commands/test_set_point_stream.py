@@ -77,7 +77,7 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
 ) -> None:
     """After a command has expired, the driver sends Stop at 20 Hz, for 1 s or 5 s.
 
-    1 s is enough if data shows that the robot is at rest.
+    1 s is enough after a proof of the stop.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)

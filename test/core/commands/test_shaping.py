@@ -45,8 +45,7 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
     """A zero twist is sent as the Stop frame.
 
-    The board could take a velocity frame with zeros for a goal at the origin: the mode, 1, is the
-    same.
+    The board could take a velocity frame with zeros for a goal at the origin.
     """
     bench.drive(0.3)
     start = len(bench.written)

@@ -83,7 +83,7 @@ def left(bench: Bench) -> None:
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
     """At shutdown, the driver checks in silence that the robot stays at rest.
 
-    It writes nothing during the check, because a bad line could turn any frame into a motion.
+    A bad line could turn any frame into a motion.
     """
     bench = driving()
     left(bench)
@@ -111,7 +111,7 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """At shutdown, the driver waits for no proof that a paused robot is at rest.
+    """At shutdown, the driver does not wait for a proof that a paused robot is at rest.
 
     A paused board sends no displacements, but its motors are off.
     """

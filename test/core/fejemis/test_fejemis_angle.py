@@ -74,10 +74,7 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """After a pause of 80 ms, a refusal names the computer until the front board's port is read.
-
-    The driver reads its two ports one after the other.
-    """
+    """After a pause of 80 ms, a refusal names the computer until the front board's port is read."""
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}
     for _ in range(round(0.08 / bench.robot.tick_s)):

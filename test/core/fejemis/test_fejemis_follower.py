@@ -44,10 +44,7 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """A front wheel that must turn back half way to its angle causes no fault.
-
-    It turns back at once and comes nearer to the new angle.
-    """
+    """A front wheel that must turn back half way to its angle causes no fault."""
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))
@@ -165,7 +162,7 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
     """Motion that a fault forbids until ~/start is still refused after a reconnect.
 
-    The driver's own start of the board does not permit the motion.
+    The driver itself starts the board then.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

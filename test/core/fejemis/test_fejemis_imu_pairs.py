@@ -320,7 +320,7 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
     """The samples at the beginning of a late read are published.
 
-    They wait for the first pose of the read, which shows that the board was not silent.
+    They wait for the first pose, which shows that the board was not silent.
     """
     bench = nominal()
     bench.run(3.0)

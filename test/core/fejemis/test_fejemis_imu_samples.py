@@ -165,7 +165,7 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
     """The two lines of each published sample come from the same cycle of the board.
 
-    Each read has ten samples. In "lost" and "twice", 1 % of the lines is lost or repeated.
+    Each read has ten samples. 1 % of the lines is lost or repeated in two of the cases.
     """
     bench = numbered()
     chance = random.Random(5)

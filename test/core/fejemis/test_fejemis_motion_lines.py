@@ -144,7 +144,7 @@ def test_what_three_lost_characters_leave() -> None:
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
     """The angle in the front board's line is right within 0.02°, and a small angle within 1 %.
 
-    The outer wheel's speed in the drive board's line is right within 0.6 %.
+    The drive board's line has the outer wheel's speed within 0.6 %.
     """
     if v == w == 0.0:
         return

@@ -277,6 +277,6 @@ def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
 ) -> None:
     """The delay of a power off is such that the checksum detects the loss of any two digits.
 
-    ``off 300`` without 3 and 0 would have a fitting checksum.
+    The checksum of ``off 300`` would miss the loss of 3 and 0.
     """
     assert whole_seconds(wanted_s) == seconds

@@ -40,7 +40,7 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
     """If one read contains a pose and then the report of a restart, the pose is handled first.
 
-    The board's clock is reset after it.
+    The board's clock is reset afterwards.
     """
     bench = nominal()
     drive = bench.robot.drive
@@ -116,7 +116,7 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 ) -> None:
     """A restart while the port is away is detected, and the odometry does not jump.
 
-    After ``away_s`` seconds, the uptime is shorter or longer than before.
+    After ``away_s`` seconds, the uptime is shorter or longer than before the restart.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -225,10 +225,7 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """A heartbeat that the board sent before a silence does not prove that it has not restarted.
-
-    Only a heartbeat that was sent after the silence proves this.
-    """
+    """Only a heartbeat that was sent after a silence proves that the board has not restarted."""
     bench = nominal()
     bench.run(2.0)
     half, front = bench.board._ports.halves[FRONT], bench.robot.front
@@ -267,7 +264,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
     """After a board was silent, the driver requests its heartbeat ten times a second.
 
-    Unrequested, it comes every 0.4 s, and a restart is noticed late.
+    The board itself sends it only every 0.4 s.
     """
     bench = nominal()
     bench.speaks = {DRIVE}

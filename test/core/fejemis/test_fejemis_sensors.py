@@ -67,9 +67,9 @@ def test_the_biases_are_subtracted_from_both_imu_topics() -> None:
 
 @pytest.mark.slow
 def test_an_orientation_has_no_turn_rate_from_before_a_reconnect() -> None:
-    """The first orientations after a reconnect have a turn rate of about zero if the robot rests.
+    """The first orientations after a reconnect have the turn rate of the robot at rest.
 
-    Before the port was lost, the robot turned at 1 rad/s.
+    The robot turned at 1 rad/s before.
     """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)

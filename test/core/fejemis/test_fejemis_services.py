@@ -330,7 +330,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 def test_a_shutdown_ends_the_job_and_writes_nothing_more_to_the_boards() -> None:
     """A shutdown ends the job of loading with a failure that names the shutdown.
 
-    Then only stop commands and angles of the front wheel are sent, and no waiting setting.
+    Afterwards, only stop commands and angles of the front wheel are sent, but no settings.
     """
     bench = nominal()
     bench.drive_on(seconds=0.3)

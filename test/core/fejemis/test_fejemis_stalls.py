@@ -58,8 +58,8 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The odometry contains the whole motion of a drive during a stall of the driver.
 
-    After an unnoticed stall, the first displacement covers seconds, because lines over 1 s late are
-    rejected. It is still plausible.
+    After an unnoticed stall, lines over 1 s late are rejected. The first displacement then covers
+    seconds, and is not implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -115,10 +115,7 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """No sample gets a stamp in the time in which the full terminal's buffer lost bytes.
-
-    After the stall, the reads follow each other without a pause.
-    """
+    """No sample gets a stamp in the time in which the full terminal's buffer lost bytes."""
     bench = nominal()
     bench.run(1.0)
     begin_s, before = bench.now, len(bench.imu)

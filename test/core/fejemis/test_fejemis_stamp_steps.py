@@ -17,7 +17,7 @@ from omnibot_driver.core.readings import ImuReading
 
 
 def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
-    """If two stamps differ only by the smallest amount of a float, the second is 1 µs later."""
+    """If two stamps differ only by a rounding error, the driver makes the second 1 µs later."""
     stamped = StampedReadings()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     for stamp_s in (50_000.0, 50_000.000000000007):

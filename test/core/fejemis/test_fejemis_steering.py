@@ -191,7 +191,7 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
     """A robot whose front wheel points ahead does not roll away when a turn on the spot begins.
 
-    The driver waits for the wheel; otherwise the robot would roll 0.17 m.
+    Without a wait for the wheel, it would roll 0.17 m.
     """
     bench = nominal()
     for _ in range(12):

@@ -107,7 +107,7 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
     """A clock that began with a late line becomes right, and rejects at most three lines meanwhile.
 
-    Lines with less delay seem too early at first. Later reads have two lines each.
+    Lines with less delay seem too early at first.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -123,7 +123,7 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
     """Damaged times that are 0.1 s too large, every third time, do not move the clock.
 
-    A correct, smaller time after each of them shows that the board's time has not jumped.
+    The correct times between them show that the board's time has not jumped.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -201,7 +201,7 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
     """Many lines that arrive at once after a stall of the host are not regarded as a restart.
 
-    The times in these lines increase, as before.
+    The board's times still increase.
     """
     clock = TeensyClock()
     for n in range(100):

@@ -39,7 +39,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
     """The covariance fits the error of the pose, also with the gains that the board boots with.
 
-    The right wheel then stops, but has a reported speed. The median of four drives is checked.
+    The right wheel then stops, but has a reported speed.
     """
     ours = LoisEcuSettings()
     names = {1000: "place right", 1003: "straight back", 1004: "curve back", 1001: "place right"}
@@ -71,7 +71,7 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
     """The driver uses all of the reports that a busy computer reads at once, every 0.05 to 0.35 s.
 
-    With an undetected stop of a wheel, the position would be wrong by 4 m.
+    Otherwise, the position would be wrong by 4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -114,7 +114,7 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> None:
     """The distance is right within 3 % if wheels roll backward at twice the commanded speed.
 
-    Without ticks, the board's odometry (0x20) shows the speed, which a large feed-forward causes.
+    The board's odometry (0x20) shows the speed, although ticks are missing.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", 2), motors=motors), "reverse", HOST_GAINS)

@@ -46,10 +46,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """For reads that are up to 30 ms late, the standard deviation of the delay is 5 to 25 ms.
-
-    The driver estimates the delay and its standard deviation.
-    """
+    """The driver estimates a standard deviation of 5 to 25 ms for reads up to 30 ms late."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)

@@ -137,7 +137,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    After a backward drive, they prove nothing on the public firmware, which then counts no ticks.
+    The public firmware counts no ticks in a backward drive, so they prove nothing after it.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -177,8 +177,8 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    The firmware still uses the last measured speed. Without feed-forward, the wheels then get no
-    power.
+    The firmware still uses the last measured speed, so the wheels get no power without
+    feed-forward.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

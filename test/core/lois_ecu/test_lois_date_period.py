@@ -39,7 +39,7 @@ class DeafBench(Bench):
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """The board has the right period of the date even if one of the lines with the period is lost.
 
-    These lines follow a request for one date, which ends the periodic dates.
+    A request for one date has ended the periodic dates.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):

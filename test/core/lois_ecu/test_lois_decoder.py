@@ -249,10 +249,7 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """The decoder counts a valid line of unknown kind or with a value out of range as unknown.
-
-    It returns no report for such a line.
-    """
+    """The decoder counts a valid line of unknown kind or with a value out of range as unknown."""
     total = 0
     for character in line[:11]:
         total ^= character
