@@ -147,3 +147,25 @@ def test_a_stall_is_noticed_before_the_bytes_that_waited_are_decoded(
     listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
     link.close("stop")
     assert order[heard[0]] == "stall"
+
+
+def test_a_command_at_the_end_of_a_shutdown_is_not_refused_because_of_a_stall(
+    board: PtyBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver shuts down, so the pacer has ended. Commands still arrive until the process ends.
+
+    The driver refuses them because it shuts down. It does not report a stall.
+    """
+    ended_s = 0.0
+    monkeypatch.setattr(
+        "omnibot_driver.shared_session.boot_time_s",
+        lambda: stall_detector.boot_time_s() + ended_s,
+    )
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    link.close("stop")
+    ended_s = 1.0
+    with pytest.raises(CommandRefused, match="shutting down"):
+        link.command(Session.command_twist, BodyTwist(0.2, 0.0, 0.0), [time.time_ns()])
