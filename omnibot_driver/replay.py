@@ -129,6 +129,7 @@ class Replay:
                     self._tell(partial(self._report, None))
                     self.call(lambda session, now: session.opened(now))
                 if not self._run_until((at_ns - self._epoch_ns) * 1e-9):
+                    self.call(_leave)  # a request in progress needs an answer
                     return
                 self.call(partial(_hear, packet))
         except LinkError as error:
@@ -187,3 +188,8 @@ class Replay:
 def _hear(packet: Packet, session: Session, now: float) -> None:
     channel, data = packet
     session.inbound.receive(data, now, channel)
+
+
+def _leave(session: Session, now: float) -> None:
+    session.shutdown.begin(now)
+    session.closed(now)

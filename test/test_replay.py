@@ -21,7 +21,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
 from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.core.packets import Packet
-from omnibot_driver.core.requests import Request
+from omnibot_driver.core.requests import Request, RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.replay import Replay
 from omnibot_driver.simulator.omnibot import BoardSettings, FaultyLine, LineFaults, SimulatedBoard
@@ -234,6 +234,22 @@ def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
     with pytest.raises(RequestRefused, match="not open"):
         replay.call(lambda s, now: s.request(Request.START, "token", now))
     replay.close("stop")
+    assert not heard.failures
+
+
+def test_a_request_is_answered_although_the_replay_is_closed() -> None:
+    """A request is pending when the driver ends, in the middle of the recording.
+
+    Its answer says that the driver is shutting down. The last state is disconnected.
+    """
+    replay, heard = start(Tape(BAD_LINE, speed=1.0))
+    heard.wait_for(lambda: heard.session.state == "nominal")
+    replay.call(lambda s, now: s.request(Request.PAUSE, "token", now))
+    replay.close("stop")
+    answers = [event for event in heard.events if isinstance(event, RequestDone)]
+    assert [answer.token for answer in answers] == ["token"]
+    assert "shutting down" in answers[0].message
+    assert heard.states[-1] == "disconnected"
     assert not heard.failures
 
 
