@@ -15,6 +15,8 @@ from std_srvs.srv import Trigger
 from omnibot_driver.boards.lois_ecu_record_topics import Recorder
 from omnibot_driver.boards.mart_topics import MartTopics
 from omnibot_driver.core.lois_ecu import RecordKind
+from omnibot_driver.core.mart.jobs import KEPT, Job
+from omnibot_driver.core.mart.readings import JobDone
 from omnibot_driver.services import Services
 
 NO_THREAD = "can't start new thread"
@@ -49,6 +51,23 @@ def test_a_download_that_no_thread_can_save_is_answered() -> None:
     services, done = SimpleNamespace(_node=NODE), SimpleNamespace(message="downloaded")
     answer = finished(MartTopics._save(services, done))
     assert answer == (False, f"downloaded; not saved: {NO_THREAD}")
+
+
+def test_a_log_that_is_not_saved_is_to_be_copied_before_the_next_log_deletes_it() -> None:
+    """The log of a MART is downloaded but not saved. The server has ended and cannot send it again.
+
+    The answer says that the file is still on the controller, and what would delete it.
+    """
+
+    async def ask(_job: Job, _arguments: tuple[object, ...]) -> JobDone:
+        return JobDone(None, True, "x.log, 3 bytes; the server has ended", "x.log", b"abc")
+
+    services = SimpleNamespace(_node=NODE, _ask=ask)
+    services._save = lambda done: MartTopics._save(services, done)
+    serve = MartTopics._service(services, Job.LOG_FILE)
+    answer = finished(serve(Trigger.Request(), Trigger.Response()))
+    assert not answer.success
+    assert f"not saved: {NO_THREAD}; {KEPT}" in answer.message
 
 
 def test_a_record_that_no_thread_can_save_is_answered() -> None:

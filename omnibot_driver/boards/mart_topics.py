@@ -26,7 +26,7 @@ from omnibot_driver.boards.mart_clock import clock_fields
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart.board import MartBoard
 from omnibot_driver.core.mart.goal import docking_inches
-from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.jobs import KEPT, Job
 from omnibot_driver.core.mart.readings import (
     BatteryReading,
     DockedReading,
@@ -139,6 +139,8 @@ class MartTopics:
             response.success, response.message = done.success, done.message
             if done.success and done.name:
                 response.success, response.message = await self._save(done)
+                if job is Job.LOG_FILE and not response.success:  # the driver cannot repeat it
+                    response.message += f"; {KEPT}"
             return response
 
         return serve

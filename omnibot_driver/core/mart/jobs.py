@@ -37,9 +37,8 @@ TIMES: Final = 3
 
 CHECK: Final = "check controller and network"
 EXIT_LOST: Final = "if the server has ended, start it again; if it still answers, call again"
-COPY: Final = (
-    "the server has ended: copy the file from the controller, before ~/start_log deletes it"
-)
+KEPT: Final = "copy the file from the controller, before ~/start_log deletes it"
+COPY: Final = f"the server has ended: {KEPT}"
 
 
 class Job(Enum):
