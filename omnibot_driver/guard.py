@@ -2,12 +2,11 @@
 
 """The guard: a separate process that stops the robot when the driver no longer can.
 
-When the driver's heartbeats on standard input cease, the guard repeats the stop command. If the
-e-stop is latched, it repeats the emergency stop. The guard must import very little.
+It acts when heartbeats on standard input cease. It must import very little.
 
 Usage: ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets as
-``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. New stop commands come as ``=STOP EMERGENCY_STOP`` and a newline,
-between two heartbeats.
+``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. The line ``=STOP EMERGENCY_STOP`` on standard input replaces both
+arguments.
 """
 
 import _signal as signal  # type: ignore[import-not-found]  # ``signal`` imports ``enum``
@@ -22,14 +21,12 @@ LATCHED_BEAT = b"e"
 """Heartbeat of a driver whose e-stop is latched."""
 WORDS = b"="
 END = b"\n"
-"""End of a message that begins with ``WORDS``. The message gives the guard a new stop command and a
-new emergency stop."""
+"""End of a message that begins with ``WORDS`` and replaces both stop commands."""
 BYE = b"!"
 """Message that ends the guard. The driver sends it after it has stopped the robot itself."""
 WRITTEN = b"w"
-"""Last message before the driver closes the guard's input, if the driver has written its last
-packets itself. These packets may still wait in the kernel, so the guard must not discard the
-kernel's output."""
+"""Last message of a driver that has written its last packets itself. The kernel may still hold
+these packets, so the guard must not discard the kernel's output."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20
@@ -46,11 +43,7 @@ Words = list[tuple[int, bytes]]
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:
-    """Watch the driver until it ends, and stop the robot if necessary.
-
-    The guard stops the robot if the driver hangs, or if the driver ends without sending ``BYE``.
-    ``BYE`` means that the driver has stopped the robot itself.
-    """
+    """Stop the robot if the driver hangs, or if the driver ends without sending ``BYE``."""
     patience_s: float | None = LIMIT_S
     latched, written, rest = False, False, b""
     while True:
@@ -89,14 +82,12 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int], drop: bool) -> None:
-    """Write the packets of the stop command ``last_words`` to their lines, 20 times.
+    """Write the packets of ``last_words`` to their lines, 20 times.
 
-    End early if all lines are lost, or if the driver runs again and can stop the robot itself.
+    Return early if all lines are lost.
 
-    ``until``: descriptors on which the driver sends. Input on one of them shows that the driver
-    runs again.
-
-    ``drop``: whether to discard first the driver's output that the lines have not sent yet.
+    * ``until``: descriptors of the driver's messages. A message also ends the function.
+    * ``drop``: whether to first discard output that the lines have not sent yet.
     """
     lines = {line for line, _ in last_words}
     for line in lines if drop else ():
@@ -116,11 +107,7 @@ def speak(last_words: Words, until: list[int], drop: bool) -> None:
 
 
 def drop_what_waits(line: int) -> None:
-    """Discard the output that the line has not sent yet.
-
-    This output may contain motion commands. The line would send them before the guard's stop
-    command.
-    """
+    """Discard the output that the line has not sent yet, which may contain motion commands."""
     # contextlib would take a tenth of the guard's memory
     try:  # noqa: SIM105
         termios.tcflush(line, termios.TCOFLUSH)

@@ -2,7 +2,7 @@
 
 """The driver's side of `guard.py`: keeps a guard process running while a port is open.
 
-The guard watches the thread that calls ``beat``. This module does not know threads or boards.
+The guard watches the thread that calls ``beat``. This module does not know boards.
 """
 
 import contextlib
@@ -22,13 +22,12 @@ from omnibot_driver.core.packets import Packets
 
 BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
-"""Shortest time between two starts of a guard, in s. It limits how often the driver restarts a
-guard that always ends at once."""
+"""Shortest time between two starts of a guard, in s."""
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""Limit for the number of killed guards that have not ended yet. At this number, the driver does
-not start another guard."""
+"""Number of killed guards that have not ended yet, at which the driver does not start another
+guard."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an uninterruptible
@@ -43,9 +42,8 @@ It includes the time that a slow guard process needs to start.
 class Keeper:
     """The guard process for a set of open lines, from construction until ``end``.
 
-    * ``descriptors``: file descriptor of each line, by channel. None if the line is not open.
-    * ``emergency_stop``: packets that the guard sends if the e-stop is latched.
-    * ``stop``: packets that the guard sends otherwise.
+    * ``descriptors``: file descriptor of each line, by channel; None if the line is not open.
+    * ``stop``, ``emergency_stop``: packets that the guard sends without and with a latched e-stop.
     """
 
     def __init__(
@@ -56,7 +54,7 @@ class Keeper:
         self.last_words = stop, emergency_stop
         self._ahead = 0
         """Number of bytes of stop commands that the guard may not have read yet. All other unread
-        bytes are heartbeats. If too many of them are unread, the guard is regarded as hung."""
+        bytes are heartbeats."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed processes that have not ended yet."""
@@ -66,10 +64,10 @@ class Keeper:
         self._start()
 
     def beat(self, now: float, *, latched: bool = False) -> str:
-        """Send the guard a heartbeat. Call this method every 0.1 s, neither more nor less often.
+        """Send the guard a heartbeat. Call this method every 0.1 s.
 
-        Returns a sentence for the user at the first failure of a guard, and at the first failure to
-        start one. Otherwise returns an empty text.
+        Returns a sentence for the user at the first failure of a guard or of its start; otherwise
+        "".
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -97,11 +95,9 @@ class Keeper:
     def end(self, *, stopped: bool, written: bool = False) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        * ``stopped``: whether the robot is already stopped. If not, the guard sends its stop
-          command before it ends.
-        * ``written``: whether the driver could write its last packets to the port. If not, a guard
-          that sends its stop command first discards the kernel's output: old motion commands may
-          wait there.
+        * ``stopped``: whether the robot is already stopped. If not, the guard first stops it.
+        * ``written``: whether the driver wrote its last packets. If not, the guard discards the
+          kernel's output before its stop: it may contain motion commands.
         """
         self._restart_at = math.inf
         if stopped:
@@ -133,9 +129,9 @@ class Keeper:
         return "the guard process hung"
 
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill the guard without waiting for its end, which later calls of ``beat`` detect.
+        """Kill the guard without waiting for its end.
 
-        The caller holds the lock of the session, so waiting would delay the e-stop.
+        Waiting would delay the e-stop, because the caller holds the lock of the session.
         """
         assert process.stdin is not None
         process.stdin.close()
@@ -144,11 +140,7 @@ class Keeper:
         self._process, self._broken = None, False
 
     def _addressed(self, packets: Packets) -> str:
-        """Return the packets as text for the guard, except packets for lines that are not open.
-
-        The text of a packet is ``DESCRIPTOR:HEX``: the file descriptor of its line, and its bytes
-        in hexadecimal.
-        """
+        """Return the packets for open lines as a text for the guard (``DESCRIPTOR:HEX,...``)."""
         return ",".join(
             f"{line}:{data.hex()}"
             for channel, data in packets
@@ -197,8 +189,7 @@ class Keeper:
     def _tell(self, kind: str, trouble: str) -> None:
         """Report the first trouble of each kind.
 
-        The kinds are separate: after a report that announces another guard, the driver must still
-        report that this guard cannot be started.
+        A failed start must be reported even after the report of a guard that died.
         """
         if kind not in self._told:
             self._told.add(kind)

@@ -2,12 +2,11 @@
 
 """The threads that serve a port and a session, and the shutdown of the driver.
 
-* The *reader* passes received bytes to the session, and delivers the results at once.
-* The *pacer* sleeps until a command, a timeout, a retry or the guard's heartbeat is due.
-* The *teller* delivers all other events.
+* The *reader* passes received bytes to the session, and delivers measurements at once.
+* The *pacer* sleeps until a command, a timeout, a retry or a heartbeat is due.
+* The *teller* delivers events from calls and from the pacer.
 
-All threads and callers use one lock. Events are delivered in the order in which they occurred under
-this lock.
+All threads and callers share one lock. Events are delivered in their order.
 """
 
 import threading
@@ -26,33 +25,20 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longest wait for a thread to end, in s.
-
-The reader thread may itself wait for the end of the guard process. If the guard has not ended after
-2.5 s, the reader kills it. The guard then ends at once, unless it is in an uninterruptible sleep.
-"""
+"""Longest wait for a thread to end, in s. The reader thread itself waits up to 2.5 s for the guard,
+and then kills the guard."""
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
 driver waits longer."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest, if there is no guard.
-
-With a guard, the driver waits only for ``STANDS_WITHIN_S``, because the guard can repeat Stop after
-the shutdown.
-"""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard can repeat
+Stop after the shutdown."""
 SILENCE_S: Final = 0.25
-"""Longest wait at shutdown, in s, for the second proof that the robot is at rest.
-
-After the first proof, the driver sends nothing more. A last Stop that the line has damaged might
-move the robot; the second proof shows that this has not happened. For a slow board, the driver
-waits longer.
-"""
+"""Longest wait at shutdown, in s, for the second proof that the robot is at rest (longer for a slow
+board). This proof shows that the line has not damaged the last Stop."""
 BOTH_PROOFS_S: Final = 2.4
-"""Longest time for both proofs at shutdown together, in s, even for a slow board.
-
-The driver's process ends itself after ``driver.LONGEST_END_S``. If there is no proof, the guard
-must have time to repeat Stop before this end.
-"""
+"""Longest time for both proofs at shutdown together, in s. The guard needs the rest of
+``driver.LONGEST_END_S`` to repeat Stop."""
 
 T = TypeVar("T")
 
@@ -61,13 +47,11 @@ class Link:
     """One session on one port, which is opened again whenever it is lost.
 
     * ``port``: name of the port in messages to the user.
-    * ``guard``: whether a separate process stops the robot when this process cannot.
-    * ``report``: receives a sentence when one of the board's ports is missing, and None when all
-      are open.
-    * ``failed``: receives the exception that ended a thread. Such an exception is always a bug.
+    * ``report``: receives a sentence when a port is missing, and None when all are open.
+    * ``failed``: receives the exception that ended a thread, which is always a bug.
 
-    All function arguments except ``opener`` and ``failed`` are called one at a time, on any thread,
-    in the order of the events.
+    The function arguments are called on any thread, in the order of the events; all except
+    ``opener`` and ``failed`` one at a time.
     """
 
     def __init__(
@@ -128,10 +112,9 @@ class Link:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass a motion command on: call ``action`` with the session, ``wish`` and the time.
+        """Call ``action`` with the session, ``wish`` and the time, to execute a motion command.
 
-        ``wish``: the motion that the sender of the command wants. ``SharedSession.command`` has the
-        details.
+        ``SharedSession.command`` describes the arguments.
         """
         self._shared.command(action, wish, sent_ns, moves_base=moves_base)
 
@@ -146,7 +129,7 @@ class Link:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets. The reader then opens it again."""
+        """Whether the port did not accept the last packets. The reader then reopens the port."""
         return self._shared.blocked
 
     def figures(self) -> tuple[LinkFigures, SessionFigures]:
@@ -165,8 +148,6 @@ class Link:
 
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
-
-        If the port is already lost, the reader thread opens it once more to send Stop.
 
         Returns whether this call sent Stop and ended the threads.
         """
@@ -207,7 +188,7 @@ class Link:
     def _stop_for_good(self) -> None:
         """Stop the robot and wait until it is at rest. The caller holds the lock.
 
-        The lock is released during the wait, so that the pacer thread can repeat Stop.
+        The wait releases the lock, so that the pacer thread can repeat Stop.
         """
         self._session.shutdown.begin(now := time.monotonic())
         end = now + BOTH_PROOFS_S

@@ -48,20 +48,15 @@ MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""State of the wheels:
-
-* Sum of the robot's displacements along the board's axes: x and y in m, yaw in rad.
-* Angle of each wheel, in rad.
-* Rate of each wheel, in rad/s; an empty tuple if the rates are unknown.
-"""
+"""State of the wheels: sum of the robot's displacements along the board's axes (m, rad), angles in
+rad, and rates in rad/s (empty if unknown)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
     """What messages contain besides measurements: frames, standard deviations and wheels.
 
-    Names of frames include the prefix. Standard deviations are in SI units, and 0 if the board has
-    no parameter for them.
+    Frame names include the prefix. Standard deviations are in SI units; 0 without a parameter.
     """
 
     odom_frame: str
@@ -271,13 +266,9 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return wall clock minus steady clock, in ns.
+    """Return wall clock minus steady clock, in ns: the possible value nearest to ``known_ns``.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. So the difference
-    is between ``wall_ns - after_ns`` and ``wall_ns - before_ns``.
-
-    ``known_ns``: the previous result. If it is within these limits, it is returned again, so that
-    the result changes rarely. Otherwise the limit that is nearer to it is returned.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

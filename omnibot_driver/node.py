@@ -41,8 +41,7 @@ LOOK_EVERY_S = WARN_EVERY_S = 2.0
 class OmniBotDriver(Node):
     """The driver node. Raises ParameterError if it cannot start with the given parameters.
 
-    ``end`` is called when the driver has to end. Its argument is the exception of a defect, or
-    None.
+    ``end`` is called when the driver has to end, with the exception of a bug, or None.
     """
 
     def __init__(
@@ -97,8 +96,7 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        With such callbacks, the executor would handle each command later, because it checks the
-        callbacks first.
+        Such callbacks would delay the handling of commands.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)

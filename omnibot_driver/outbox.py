@@ -2,10 +2,8 @@
 
 """A queue of calls that deliver events to listeners, in the order of the events.
 
-Several threads fill and empty the queue. A thread appends a call while it holds the lock under
-which the event occurred. The call is made after this lock is released, so a slow listener does not
-delay commands. Only one thread makes calls at a time. This module knows threads; it does not know
-what is delivered.
+The calls are made one at a time and without a lock, so that a slow listener does not delay
+commands. This module does not know what is delivered.
 """
 
 import threading
@@ -14,8 +12,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls at which the queue is full. If the queue is full, a thread that calls
-``deliver`` waits until another thread has made the queued calls."""
+"""Number of queued calls at which the queue is full. A thread that calls ``deliver`` then waits
+until another thread has made the queued calls."""
 
 Delivery = Callable[[], object]
 
@@ -32,21 +30,21 @@ class Outbox:
     def put(self, delivery: Delivery) -> None:
         """Append a call, without waiting.
 
-        The caller must hold the lock under which the event occurred. So the calls have the order of
-        the events.
+        The caller must hold the lock under which the event occurred, so that the calls keep the
+        order of the events.
         """
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
         """Return whether the caller may bypass the queue and call the listener directly.
 
-        The caller must hold the lock under which the event occurred. After the result True, the
-        caller must call ``release``.
+        The caller must hold the lock under which the event occurred, and call ``release`` after
+        True.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a successful ``claim``. The caller must call this even if the delivery has failed."""
+        """End a successful ``claim``, even if the delivery has failed."""
         self._delivering.release()
         if self._waiting:
             self.deliver()
@@ -57,10 +55,9 @@ class Outbox:
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the queued calls. If another thread is making calls, leave them to that thread.
+        """Make the queued calls, or leave them to another thread that is making calls now.
 
-        But if the queue is full, wait until that thread is done, then make the calls that are left.
-        Raises the exceptions of the calls.
+        If the queue is full, wait for that thread. Raises the exceptions of the calls.
         """
         waiting, delivering = self._waiting, self._delivering
         while waiting:  # checked again after the release, for calls that were put meanwhile

@@ -2,10 +2,8 @@
 
 """Standard output and standard error that never block the process.
 
-rclpy holds Python's global lock while it logs. After ctrl-S on the terminal, a log line would
-therefore block all threads, even the one that sends the guard's heartbeats. To prevent this, output
-passes through a pipe. If the pipe is full, lines are lost. This module knows descriptors; it does
-not know what is printed.
+After ctrl-S on the terminal, a blocked log line would stop all Python threads. So output passes
+through a pipe, and is lost if the pipe is full. This module does not know what is printed.
 """
 
 import contextlib

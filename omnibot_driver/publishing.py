@@ -33,13 +33,12 @@ from omnibot_driver.qos import LATCHED
 from omnibot_driver.transforms import transform_publisher
 
 RAW_DEPTH: Final = 1000
-"""Queue depth of the topics with raw bytes. The queue is long, so that a recorder that is delayed
-for seconds still gets every byte."""
+"""Queue depth of the topics with raw bytes, so that a recorder that is delayed for seconds gets
+every byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Limit of a simulated clock, in ns. From this time on, the driver does not publish measurements.
-The limit is a minute before the latest time that a stamp can express, because a stamp may be later
-than the clock."""
+"""Limit of a simulated clock, in ns: later measurements are not published. A stamp may be later
+than the clock, so the limit is a minute before the latest possible stamp."""
 
 
 class Publishing:
@@ -110,10 +109,7 @@ class Publishing:
         self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[Packet], None]]:
-        """Return keyword arguments for ``Link``, which make the node publish the port's bytes.
-
-        The values are functions that publish each read and each write of the port.
-        """
+        """Return keyword arguments for ``Link`` that publish each read and write of the port."""
         return {
             "on_read": self._raw_publisher("~/raw_rx"),
             "on_write": self._raw_publisher("~/raw_tx"),
@@ -160,11 +156,9 @@ class Publishing:
             self._node.get_logger().error(f"{trouble} (retrying)")
 
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
-        """Publish events with stamps of a simulated clock.
+        """Publish events with stamps of a simulated clock, which may jump back.
 
-        While this clock is 0 or outside the range of ROS time, only events without a stamp are
-        published, such as answers to requests. After the clock has jumped back, the stamps begin
-        again at its new time.
+        While the clock is 0 or too late for ROS time, only events without a stamp are published.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -185,16 +179,13 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """Record that ROS is shutting down, so that later events are not published.
-
-        ROS calls this method. It would take too much time to ask ROS at each event instead.
-        """
+        """Stop publishing, because ROS is shutting down. ROS calls this method."""
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Record whether the node's time is simulated. ROS calls this method at each change.
+        """Record whether the node's time is simulated.
 
-        To ask ROS at each event instead would take a microsecond more per event.
+        ROS calls this method at each change of time.
         """
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
@@ -252,10 +243,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text is new since the last change of state. Remember the text.
+        """Return whether this text is new since the last change of state, and remember it.
 
-        A change to disconnected or connecting does not count. So if a port is lost repeatedly, each
-        text is logged only once until the board sends valid data.
+        Changes to disconnected and connecting do not count.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

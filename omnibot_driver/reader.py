@@ -2,8 +2,7 @@
 
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
-The reader delivers measurements itself, so that nothing delays them. The reader must stop the robot
-before it releases a port.
+The reader delivers measurements itself. It must stop the robot before it releases a port.
 """
 
 import math
@@ -30,9 +29,9 @@ LONGEST_WAIT_S: Final = 2.0
 class Reader:
     """The work of the reader thread, which runs ``serve``, and its counts.
 
-    * ``trouble``: the reason why a port of the board is not open. Empty if all are open.
+    * ``trouble``: why a port of the board is not open; empty if all are open.
     * ``opened``: how often the port was opened.
-    * ``overruns``: how often the kernel has lost bytes since the last opening. None if unknown.
+    * ``overruns``: losses of bytes in the kernel since the last opening; None if unknown.
     """
 
     def __init__(
@@ -164,9 +163,11 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Let the session process received bytes. The result can be a command to the board.
+        """Let the session process received bytes whose measurements are already delivered.
 
-        The measurements in these bytes are already delivered. The caller holds the lock.
+        The result can be a command to the board.
+
+        The caller holds the lock.
         """
         if self._session.inbound.process(now):
             self._shared.settle()

@@ -2,7 +2,7 @@
 
 """A recording in place of a port: the URL ``replay://bag?speed=10`` names a rosbag2.
 
-This module knows the URL and the library rosbags; it does not know what the bytes mean.
+This module does not know what the bytes mean.
 """
 
 import math
@@ -25,10 +25,10 @@ RAW_NAME: Final = "/raw_rx"
 class Recording:
     """A recording of a board's bytes, in one bag.
 
-    * ``path``: the bag, which is a folder or a single file.
+    * ``path``: the bag, a folder or a single file.
     * ``topics``: the topic of each channel.
-    * ``speed``: factor of the playback speed. Infinity: as fast as possible.
-    * ``delay_s``: time from the start of the driver to the start of the playback.
+    * ``speed``: factor of the playback speed; infinity: as fast as possible.
+    * ``delay_s``: time from the start of the driver to that of the playback.
     """
 
     path: Path
@@ -69,9 +69,7 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that the URL names.
-
-    The bag needs a topic for one channel at least; a channel without a topic has no data.
+    """Return the recording that the URL names, with a topic for at least one channel.
 
     Raises ParameterError if the URL or the bag is wrong.
     """

@@ -2,8 +2,7 @@
 
 """A session that is fed from a recording: the counterpart of `Link` for recorded bytes.
 
-The session's time is that of the recording, so the session's output is the same at every playback
-speed. Packets to the board are discarded.
+The output does not depend on the playback speed. Packets to the board are discarded.
 """
 
 import threading
@@ -24,8 +23,8 @@ JOIN_TIMEOUT_S: Final = 1.0
 SHORTEST_STEP_S: Final = 0.001
 """Shortest time between two calls of ``Session.tick``, in s, even if the session asks for less."""
 LONGEST_PAUSE_S: Final = 10.0
-"""How much of a pause of the recording is played, in s. By then, the session has noticed the
-silence, and nothing more happens in it."""
+"""Longest part of a pause that is played, in s. After this time, the session has noticed the
+silence and does not change."""
 
 T = TypeVar("T")
 
@@ -33,10 +32,8 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    * ``deliver``: function that receives the events, and the time of day in ns that belongs to the
-      session's time 0.
-    * ``failed``: function that receives the exception that ended the thread. Such an exception is
-      always a defect.
+    * ``deliver``: receives events, and the time of day in ns at the session's time 0.
+    * ``failed``: receives the exception that ended the thread, which is always a bug.
 
     The function arguments, except ``failed``, are called one at a time, in the order of the events.
     """
@@ -138,10 +135,9 @@ class Replay:
         self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
-        """Call ``Session.tick`` at each due time until ``end_s``. Skip most of a long pause.
+        """Call ``Session.tick`` at each due time until ``end_s``, but skip most of a long pause.
 
-        A skipped time passes for the session, but not for the user. Returns False if ``close``
-        interrupts this.
+        Returns False if ``close`` is called meanwhile.
         """
         pause_s = end_s - self._now
         if pause_s > LONGEST_PAUSE_S:

@@ -2,9 +2,8 @@
 
 """Repairs copies of bag files whose recording was not finished.
 
-An mcap file (mcap.dev/spec) consists of records and an index. A record has a kind (1 byte), a
-length (8 bytes) and content. An sqlite3 database can have its latest changes in a separate file,
-the journal.
+An mcap file (mcap.dev/spec) has records (kind: 1 byte, length: 8 bytes, content) and an index. An
+sqlite3 database can have its latest changes in a separate file, the journal.
 """
 
 import shutil

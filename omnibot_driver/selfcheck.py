@@ -2,7 +2,7 @@
 
 """Advice on what disturbs the driver: settings of the computer, parameter files, and other nodes.
 
-This module reads sysfs and parameter files; it does not use pyserial, ROS or a board.
+This module does not use pyserial, ROS or a board.
 """
 
 import re
@@ -59,8 +59,7 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 def waiting_advice(port: str, now_ns: int) -> str:
     """Return a warning if the node's clock, ``now_ns``, is still 0; otherwise empty.
 
-    If the port is a recording, the result is empty: a recording has its own stamps and needs no
-    clock.
+    The result is also empty for a recording, which needs no clock.
     """
     if now_ns or port.lower().startswith(RECORDING):
         return ""
@@ -104,10 +103,9 @@ def _is_for(node: str, file: str) -> bool:
 
 
 def _sections(content: Any, above: str = "") -> Iterator[str]:
-    """Yield, for each section of a parameter file, a pattern of the nodes that it applies to.
+    """Yield, for each section of a parameter file, a pattern of the full names of its nodes.
 
-    The pattern matches full names of nodes. In the file, ``*`` stands for one part of a name, and
-    ``**`` for any number of parts.
+    In the file, ``*`` is one part of a name, ``**`` any number of parts.
     """
     for name, below in content.items() if isinstance(content, dict) else ():
         if name == "ros__parameters":

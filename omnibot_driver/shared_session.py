@@ -2,8 +2,7 @@
 
 """One session and its open port, which several threads share under one lock.
 
-After each input to the session, ``settle`` must be called. It writes the packets that are due, and
-queues events in their order. This module starts no thread and opens no port.
+Call ``settle`` after each input to the session. This module starts no thread and opens no port.
 """
 
 import math
@@ -31,10 +30,10 @@ T = TypeVar("T")
 class SharedSession:
     """A session, its open port, and the lock that protects both.
 
-    Only ``call``, ``command`` and ``blocked`` may be used without holding ``lock``.
+    Only ``call``, ``command`` and ``blocked`` may be used without ``lock``.
 
-    * ``changed``: condition variable of this lock. The pacer and the shutdown wait for it.
-    * ``keeper``: the object that runs the guard process. None without a guard.
+    * ``changed``: condition variable of this lock, for the pacer and the shutdown.
+    * ``keeper``: the object that runs the guard process; None without a guard.
     * ``write_error``: the error after which nothing more is written, or None.
     """
 
@@ -58,16 +57,11 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line.
-
-        The port may be lost while the link ends. Then the reader opens it again and writes Stop.
-        After this Stop, ``told`` becomes True only if a standstill was still to be proved
-        (``Shutdown.owed``).
-        """
+        """Whether the link wrote its last Stop to every line. For a lost port that was opened
+        again, only if a standstill was still to be proved (``Shutdown.owed``)."""
         self.stood = False
-        """Whether the robot was known to stand still when the link ended. Three conditions must be
-        true: Stop was written to every line, measurements had shown the robot at rest, and no
-        motion was commanded after these measurements."""
+        """Whether the robot was known to stand still when the link ended. Stop was written to every
+        line, and measurements showed the robot at rest after the last motion command."""
         self.closing = threading.Event()
         """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write
@@ -100,15 +94,14 @@ class SharedSession:
     ) -> None:
         """Call ``action`` with the session and ``wish``, the motion that a sender commands.
 
-        * ``sent_ns``: times at which the sender may have sent the command, as time of day in ns.
-          There are two times if the offset of the sender's clock is not known well, and none for a
-          command to stop.
-        * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
-          the motion interlock must know that the sender is still active.
+        * ``sent_ns``: possible times of sending, as time of day in ns: two if the sender's clock is
+          uncertain, none for a command to stop.
+        * ``moves_base``: whether the command moves the base, so that the motion interlock must know
+          of a refusal.
 
-        Raises CommandRefused if ``action`` refuses the command, or if the command may have been
-        sent before or during a recent stall of this process. The function ``refused`` is then
-        called with the reason, except if too many events wait for delivery.
+        Raises CommandRefused if ``action`` refuses the command, or if it may have been sent before
+        or during a recent stall of this process. ``refused`` gets the reason, unless the queue of
+        events is full.
         """
         try:
             with self.lock:
@@ -136,7 +129,7 @@ class SharedSession:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets; the reader then opens it again."""
+        """Whether the port did not accept the last packets. The reader then reopens the port."""
         with self.lock:
             return self.write_error is not None
 
@@ -196,9 +189,9 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer thread runs. If a heartbeat is due, send it to the guard process.
+        """Record that the pacer thread runs, and send the guard a heartbeat if one is due.
 
-        If this method is not called for 0.4 s, the driver regards itself as stalled.
+        A pause of 0.4 s counts as a stall.
         """
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)

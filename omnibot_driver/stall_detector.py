@@ -2,8 +2,8 @@
 
 """Detection of stalls: times in which this process, or its pacer thread, did not run.
 
-A command that was sent during a stall is outdated afterwards, so it must not be obeyed. Every
-``now`` is a time of ``boot_time_s``. This module knows times; it does not know threads or commands.
+A command from a stall must not be obeyed. Every ``now`` is a time of ``boot_time_s``. This module
+does not know threads.
 """
 
 import math
@@ -11,20 +11,14 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Duration, in s, from which a pause between calls of ``StallDetector.passed`` is a stall.
-
-The guard process waits a little longer before it stops the robot. So the driver notices each stall
-in which the guard stops the robot.
-"""
+"""Duration, in s, from which a pause between calls of ``StallDetector.passed`` is a stall. This
+limit must be shorter than the guard's."""
 SETTLE_S: Final = 0.25
-"""Time in s for which the driver still refuses commands after the end of a stall.
-
-The driver knows the sender's clock only roughly. So a command that was sent during the stall may
-have a stamp that is a little later than the end of the stall.
-"""
+"""Time in s after a stall in which the driver still refuses commands, because the sender's clock is
+known only roughly."""
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
-A command that seems to be older comes from a sender whose clock is wrong."""
+A stamp that is older comes from a wrong clock."""
 
 
 def boot_time_s() -> float:
@@ -40,9 +34,8 @@ def boot_time_ns() -> int:
 class StallDetector:
     """A detector of stalls: whether this process is stalled now, and when the last stall ended.
 
-    The pacer thread calls ``passed`` ten times a second or more, to show that it runs. Other
-    threads call ``begun`` before they use the session. If ``begun`` reports a stall, the calling
-    thread must stop the robot first. Setting the computer's clock does not disturb the detector.
+    The pacer thread calls ``passed`` at least ten times a second. Other threads call ``begun``
+    before they use the session, and stop the robot after a stall.
     """
 
     def __init__(self) -> None:
@@ -83,8 +76,7 @@ class StallDetector:
     def outlived_by(self, sent_ns: int, now: float) -> bool:
         """Return False if a command may have been sent before or during a recent stall, else True.
 
-        ``sent_ns``: the command's time of sending, as time of day in ns. ``now``: time of
-        ``boot_time_s``.
+        ``sent_ns``: when the command was sent, as time of day in ns.
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False

@@ -2,9 +2,8 @@
 
 """Parameters: the table of one board, and the rows that boards share. Each parameter is a row.
 
-``make docs`` writes config/<board>.yaml and docs/parameters.md from the tables. New common rows
-belong in ``operating`` or ``robot``; rows of one board belong beside the board's profile. This
-package knows neither ROS nor a board.
+Rows of one board are beside its profile. ``make docs`` writes config/<board>.yaml and
+docs/parameters.md. This package knows neither ROS nor a board.
 """
 
 from omnibot_driver.parameters.parameter import RANGE_TYPES, Parameter, Value

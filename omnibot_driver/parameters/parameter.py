@@ -24,19 +24,17 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 class Parameter:
     """One parameter: a row in the parameter table of a board.
 
-    ``name``: lower case, with ``_`` between words. The value of a name that ends in ``_frame`` is
-    checked as a frame's name. If the names ``…_minimum`` and ``…_maximum`` both exist, they are the
-    limits of a range sensor in m, and the first must be below the second.
-    ``unit``: such as "m/s"; empty if the value has no unit.
-    ``description``: one sentence or a few. The first one says what the value is or does.
-    ``default``: its type is the parameter's type. A list has at least one item.
-    ``low``, ``high``, ``choices``: limits and allowed values; for a list, those of each item. A
-    number needs both limits, or choices.
-    ``fixed``: whether the value is read-only after the start.
-    ``calibrated``: whether a calibration file may contain the value.
-    ``length``: smallest and largest length of a list; None: the length of the default.
-    ``unset``: whether the value is None until the user sets it. ``default`` then only defines the
-    type.
+    * ``name``: lower case, with ``_`` between words. ``…_frame``: the value must be a frame name.
+      ``…_minimum``, ``…_maximum``: limits of a range sensor in m, the first below the second.
+    * ``unit``: such as "m/s"; empty if the value has no unit.
+    * ``description``: its first sentence says what the value is or does.
+    * ``default``: defines the type. A list has at least one item.
+    * ``low``, ``high``, ``choices``: limits and allowed values of the value or of each item. A
+      number needs both limits, or choices.
+    * ``fixed``: whether the value is read-only after the start.
+    * ``calibrated``: whether a calibration file may contain the value.
+    * ``length``: smallest and largest length of a list; None: that of the default.
+    * ``unset``: whether the value is None until the user sets it.
     """
 
     name: str
@@ -144,9 +142,9 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """Convert an integer to a float, or a whole float to an integer, if ``kind`` requires it.
+    """Convert an integer to a float, or a float such as 2.0 to an integer, if ``kind`` requires it.
 
-    A whole float is one without a fraction, such as 2.0. Other values are returned unchanged.
+    Other values are returned unchanged.
     """
     if kind is float and type(value) is int:
         return float(value)

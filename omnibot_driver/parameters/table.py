@@ -60,11 +60,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""For some common parameters, the function that decides whether a board has the parameter.
-
-The function's argument is the traits of the board. A common parameter that is not in this table
-does not depend on the traits.
-"""
+"""For each common parameter that some boards lack: the function that decides by the traits whether
+a board has it."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -80,14 +77,11 @@ DISPENSABLE: Final = frozenset(
         "twist_angular_stddev",
     }
 )
-"""Common parameters that a board may omit. A board must have all other common parameters that fit
-its traits, because the driver reads them."""
+"""Common parameters that a board may omit. The driver reads all others that fit the traits of the
+board."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""Values of the parameter ``on_exit`` besides ``stop``.
-
-Each is mapped to the request that the driver sends at its exit. A board offers a value only if it
-supports this request.
-"""
+"""Values of the parameter ``on_exit`` besides ``stop``, each with its request. A board offers a
+value if it supports the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,12 +138,12 @@ def table(
     changed: Mapping[str, Mapping[str, Any]] | None = None,
     checks: Sequence[Check] = (),
 ) -> Table:
-    """Return the table of a board with these traits.
+    """Return the table of a board with these traits. Raises ValueError if a name is wrong.
 
-    ``own``: rows that only this board has, by section.
-    ``without``: names in ``DISPENSABLE`` that have no meaning for this board.
-    ``changed``: changed fields of common rows, such as ``{"port": {"default": "udp://"}}``.
-    ``checks``: functions that check several values of this board together.
+    * ``own``: rows that only this board has, by section.
+    * ``without``: names in ``DISPENSABLE`` that this board does not have.
+    * ``changed``: changed fields of common rows, such as ``{"port": {"default": "udp://"}}``.
+    * ``checks``: functions that check several values together.
     """
     changes = {
         "on_exit": {
@@ -210,7 +204,7 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
 def _require_ranges(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if a range sensor's smallest distance is not below its largest one.
 
-    A parameter with ``_minimum`` is accepted without a check if there is none with ``_maximum``.
+    A parameter with ``_minimum`` but without its ``_maximum`` is not checked.
     """
     for least in (name for name in values if name.endswith("_minimum")):
         most = f"{least.removesuffix('minimum')}maximum"
