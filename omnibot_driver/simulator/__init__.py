@@ -2,8 +2,8 @@
 
 """Simulated motor boards for tests of the driver, each written from the manual of the real board.
 
-The simulator shares no code with the driver, so tests can reveal a misread manual. Until the
-next release, the names of ``simulator.omnibot`` can also be imported from here.
+The simulator shares no code with the driver. Imports from here are deprecated: use
+``simulator.omnibot``.
 """
 
 import warnings

@@ -2,8 +2,7 @@
 
 """Command line that runs a simulated board in real time, with its ports and a console on stdin.
 
-This module knows arguments, signals and the console. It must not know any board's protocol or
-internals.
+This module must not know any board's protocol or internals.
 """
 
 import argparse
@@ -132,8 +131,7 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 def _signals_as_readable() -> Iterator[int]:
     """Yield a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives.
 
-    These signals have no other effect. If the process ignores SIGHUP from the start, for example
-    under nohup, it continues to ignore it: SIGHUP then has no effect on the descriptor either.
+    The signals have no other effect. SIGHUP stays ignored under nohup.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -177,8 +175,7 @@ def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
 def _is_in_background(console: int) -> bool:
     """Return whether the console is a terminal that now belongs to another program.
 
-    This is so, for example, if the user started the simulator with ``&``. The kernel would suspend
-    this process if it read from such a terminal.
+    The kernel would suspend this process if it read from such a terminal.
     """
     try:
         return os.tcgetpgrp(console) != os.getpgrp()

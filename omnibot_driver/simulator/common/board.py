@@ -11,18 +11,17 @@ from dataclasses import dataclass
 from typing import Protocol
 
 Packet = tuple[int, bytes]
-"""Index of the channel, and the bytes. If the channel carries datagrams, the bytes are one complete
-datagram."""
+"""Index of the channel, and the bytes: one complete datagram if the channel carries datagrams."""
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
     """One connection between a board and the computer.
 
-    name: empty if the board has only one channel.
-    parameter: name of the driver's parameter for this port. It is empty if the channel uses the UDP
-        port after that of the previous channel.
-    datagrams: whether the channel carries UDP datagrams. If not, it is a serial line.
+    * ``name``: empty if the board has only one channel.
+    * ``parameter``: the driver's parameter for this port; empty for the UDP port after that of the
+      previous channel.
+    * ``datagrams``: whether the channel carries UDP datagrams instead of serial bytes.
     """
 
     name: str = ""
@@ -31,11 +30,7 @@ class Channel:
 
 
 class SimulatedBoard(Protocol):
-    """A board with its robot.
-
-    A simulated board depends only on its settings and its input: the same ones always give the same
-    output.
-    """
+    """A board with its robot. The same settings and input always give the same output."""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -48,8 +43,8 @@ class SimulatedBoard(Protocol):
     def receive(self, data: bytes, now: float, channel: int, /) -> None:
         """Receive data that was sent to the board; a later ``advance`` returns the reply.
 
-        data: one datagram, or any chunk of serial bytes.
-        now: arrival time in s, by any monotonic clock.
+        * ``data``: one datagram, or any chunk of serial bytes.
+        * ``now``: arrival time in s, by any monotonic clock.
         """
 
     def advance(self) -> list[Packet]:
@@ -80,5 +75,5 @@ class SimulatorModule(Protocol):
     def from_arguments(self, arguments: argparse.Namespace) -> SimulatedBoard:
         """Return the board that the options describe.
 
-        ``arguments.seed`` is the seed of its random numbers.
+        ``arguments.seed``: seed of the random numbers.
         """

@@ -2,7 +2,7 @@
 
 """A faulty serial line: it loses bytes, one by one or in bursts, and flips bits.
 
-This module knows bytes and probabilities. It must not know what the bytes mean.
+This module must not know what the bytes mean.
 """
 
 from collections import Counter
@@ -16,9 +16,9 @@ LONGEST_BURST = 200
 class LineFaults:
     """Probability of each fault, per byte.
 
-    lose: the byte is lost.
-    burst: the byte and up to 199 bytes after it are lost.
-    flip: one bit of the byte changes.
+    * ``lose``: the byte is lost.
+    * ``burst``: the byte and up to 199 bytes after it are lost.
+    * ``flip``: one bit of the byte changes.
     """
 
     lose: float = 0.0
@@ -31,8 +31,6 @@ _GOOD = LineFaults()
 
 class FaultyLine:
     """A serial line with random faults, which depend only on the bytes and the seed.
-
-    They do not depend on how the bytes are split into chunks.
 
     lost, flipped: numbers of bytes lost and changed so far.
     """

@@ -2,7 +2,7 @@
 
 """A faulty network: it loses, duplicates, delays and reorders datagrams.
 
-This module knows datagrams, probabilities and board time. It must not know what the datagrams mean.
+This module must not know what the datagrams mean.
 """
 
 import heapq
@@ -14,12 +14,10 @@ from random import Random
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkFaults:
-    """Faults of a network. They apply to each datagram, in both directions.
+    """Faults of each datagram, in both directions.
 
-    lose, duplicate: probabilities that a datagram is lost or duplicated.
-
-    delay_s: longest delay in s. Each datagram and each duplicate has its own random delay, from 0
-    to this value. So the order of the datagrams may change.
+    * ``lose``, ``duplicate``: probabilities of the faults.
+    * ``delay_s``: longest random delay of a datagram or duplicate, in s. The order may change.
     """
 
     lose: float = 0.0

@@ -2,8 +2,7 @@
 
 """Options common to all simulated boards, on the command line and in a sim:// URL.
 
-This module knows the names, values and effects of options. It must not know what runs the board,
-nor any particular board.
+This module must not know any board, or the program that runs it.
 """
 
 import argparse

@@ -2,8 +2,7 @@
 
 """A simulated board in real time: the thread that advances it tick by tick.
 
-This module knows the clock and the board's ``receive`` and ``advance``. It must not know packets'
-transport or meaning.
+This module must not know what packets mean or how they are transported.
 """
 
 import threading
@@ -22,10 +21,8 @@ UNREAD_LIMIT = 4095
 """Number of unread bytes that a Linux terminal holds; further bytes are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""Longest delay in s that the thread makes up for by running the missed ticks.
-
-After a longer delay, the thread skips the missed ticks.
-"""
+"""Longest delay in s that the thread makes up for by running the missed ticks. After a longer
+delay, it skips them."""
 
 _JOIN_S = 5.0
 
@@ -33,10 +30,9 @@ _JOIN_S = 5.0
 class RunningBoard(ABC, Generic[B]):
     """Runs a board in a thread from ``start`` to ``stop``; its packets pass through ``lines``.
 
-    ``dropped``: number of bytes that were lost at the port, because the driver did not read them in
-    time or its UDP address is unknown.
-
-    ``board``: the simulated board. Other threads must hold ``lock`` while they use it.
+    * ``dropped``: number of bytes lost at the port: not read in time, or the driver's UDP address
+      is unknown.
+    * ``board``: the simulated board, which other threads must use under ``lock``.
 
     ``stop``, ``check`` and ``wait_for`` raise RuntimeError if the thread has died.
     """

@@ -2,7 +2,7 @@
 
 """A simulated board in real time for other programs: each channel has its own port.
 
-This module knows the ports of the channels. It must not know what packets mean.
+This module must not know what packets mean.
 """
 
 import os
@@ -43,9 +43,9 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    links: paths of symbolic links, one for each pseudo-terminal. With a single path and several
-        pseudo-terminals, the links are PATH-CHANNEL.
-    udp_port: first UDP port, 0 for any free port.
+    * ``links``: symbolic links, one for each pseudo-terminal. One path for several gives
+      PATH-CHANNEL.
+    * ``udp_port``: first UDP port, 0 for any free port.
 
     Raises OSError on entry if a link or a port is unavailable.
     """

@@ -20,8 +20,8 @@ class Terminal:
 
     While ``UNREAD_LIMIT`` bytes are unread, further bytes are lost.
 
-    ``link``: path of a symbolic link. It replaces a dead link, or a link to a pseudo-terminal.
-    Raises FileExistsError if anything else is at this path, and OSError if the link cannot be made.
+    ``link``: path of a symbolic link, which replaces a dead link or one to a pseudo-terminal.
+    Raises OSError if the link cannot be made (FileExistsError if the path is taken).
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

@@ -54,10 +54,9 @@ class UdpSocket:
 
 
 def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
-    """Open ``count`` sockets on consecutive ports, beginning with ``port``.
+    """Open ``count`` sockets on consecutive ports, beginning with ``port``, or anywhere if it is 0.
 
-    If ``port`` is 0, the system chooses the first port. Raises OSError if one of the ports is not
-    free or does not exist.
+    Raises OSError if one of the ports is not free or does not exist.
     """
     if not 0 <= port <= LARGEST - count + 1:
         raise OSError(

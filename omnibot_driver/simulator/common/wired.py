@@ -2,8 +2,7 @@
 
 """A board with its lines, in board time. The lines carry packets, and can be faulty.
 
-Serial bytes to the board never have faults. Equal input gives equal output. This module knows
-channels and lines. It must not know real time or packets' meaning.
+Serial bytes to the board never have faults. This module must not know what packets mean.
 """
 
 from collections.abc import Sequence
@@ -26,10 +25,9 @@ def good_line(channel: Channel) -> Line:
 
 
 class WiredBoard(Generic[B]):
-    """A board and one line for each of its channels, in order.
+    """A board and one line for each of its channels, in order; by default, lines without faults.
 
-    If ``lines`` is not given, every channel gets a line that has no faults. Raises ValueError if
-    the lines do not match the channels.
+    Raises ValueError if the lines do not match the channels.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:

@@ -2,8 +2,7 @@
 
 """The two simulated Teensys of the Fejemis, written from the manual and public host programs.
 
-The package must share no code with the driver, because tests would not find an error in shared
-code. ``SimulatedFejemis`` reads no clock and no port.
+The package must share no code with the driver. ``SimulatedFejemis`` reads no clock and no port.
 """
 
 from omnibot_driver.simulator.fejemis.board import CHANNELS, SimulatedFejemis

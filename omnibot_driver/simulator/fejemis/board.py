@@ -8,7 +8,7 @@ The simulation is deterministic. Three assumptions are not in the manual:
 * The front wheel does not move before the first motion command.
 * A restart ends motion and subscriptions.
 
-The module knows which Teensy is at which port, and when a fault occurs. It must not know commands.
+The module must not know commands.
 """
 
 from collections.abc import Mapping

@@ -11,8 +11,8 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
 """Factory parameters of the steering controller: the manual's P-Lead controller.
 
-They are in the order of the help text: use, Kp; useI, taui, ilimit; constant 1; useLeadf, tz,
-tp = alpha * tau_d; useLeadb, tz, tp; usePre, tz, tp; useULim, Ulim.
+Order, as in the help text: use, Kp; useI, taui, ilimit; constant 1; useLeadf, tz, tp = alpha *
+tau_d; useLeadb, tz, tp; usePre, tz, tp; useULim, Ulim.
 """
 
 WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
@@ -22,11 +22,9 @@ WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 class DriveConfig:
     """Configuration of the drive Teensy.
 
-    ``wheel_base_m``: distance between the driving wheels, for the odometry. The control of turns
-    uses B in ``confs_m`` instead.
-
-    ``confs_m``: the manual's B and F, by which the Teensy controls turns. B is the distance between
-    the driving wheels, F the distance from the axle to the steered wheel.
+    * ``wheel_base_m``: distance between the driving wheels, for the odometry.
+    * ``confs_m``: the same distance for the control of turns, and the distance from the axle to the
+      steered wheel (the manual's B and F).
     """
 
     number: int
@@ -47,12 +45,9 @@ class DriveConfig:
 class FrontConfig:
     """Configuration of the front Teensy.
 
-    ``confs_m``: the manual's B and F. B is the distance between the driving wheels, F the distance
-    from the axle to the steered wheel. The steering uses only F.
-
-    ``ir``: raw readings of sensor 1 at 13 cm and 50 cm, then those of sensor 2.
-
-    ``steering``: parameters of the steering controller, in the order of ``cpsteer``.
+    * ``confs_m``: the manual's B (not used) and F, the distance from the axle to the steered wheel.
+    * ``ir``: raw readings of sensor 1 at 13 cm and 50 cm, then those of sensor 2.
+    * ``steering``: parameters of the steering controller, in the order of ``cpsteer``.
     """
 
     number: int

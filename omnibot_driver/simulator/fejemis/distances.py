@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two distance sensors of the drive Teensy, which look forward.
+"""The two forward distance sensors of the drive Teensy, which see a wall across the x axis.
 
-They measure the distance to a wall across the x axis, if the settings have one. The sonar measures
-only when it is triggered. The module knows only the robot's pose and the place of the wall.
+The sonar measures only when it is triggered. The module knows only pose and wall.
 """
 
 from math import cos

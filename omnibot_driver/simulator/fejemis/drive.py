@@ -2,8 +2,7 @@
 
 """The drive Teensy: control of the driving wheels, odometry, IMU, battery, distance sensors.
 
-This module knows the simulated robot, and the drive Teensy as its manual describes it. It must not
-know the front Teensy: it learns the front wheel's angle only from a command.
+This module must not know the front Teensy: the front wheel's angle comes from a command.
 """
 
 from collections.abc import Callable
@@ -26,15 +25,10 @@ STOPPED, FREE = -1, 10
 class DriveTeensy(Teensy[DriveConfig]):
     """The simulated drive Teensy.
 
-    ``source``: the source of the motion commands, which heartbeats report as rcSource; -1 while the
-    Teensy is stopped.
-
-    ``reference``: speed in m/s and turn rate in rad/s of the last motion command (``rc``).
-
-    ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command, in degrees.
-
-    ``off_at_s``: time in s at which the Teensy cuts the power, or ``None`` if it has not been
-    requested to do so.
+    * ``source``: source of the motion commands (rcSource in heartbeats); -1 while stopped.
+    * ``reference``: speed in m/s and turn rate in rad/s of the last ``rc`` command.
+    * ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command, in degrees.
+    * ``off_at_s``: time in s of a requested power-off, or None.
     """
 
     version = 110
@@ -189,10 +183,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         return "mago " + " ".join(f"{x:.4f}" for x in (*config.mag_offset_ut, *config.mag_matrix))
 
     def velocity(self) -> tuple[float, float]:
-        """Return the speeds of the left and the right wheel in m/s.
-
-        The firmware computes them from the time between two ticks, so they are not quantised.
-        """
+        """Return the speeds of the left and the right wheel in m/s, which are not quantised."""
         (left, right), (left_m, right_m) = self.vehicle.radps, self.config.radii_m
         return left * left_m, right * right_m
 

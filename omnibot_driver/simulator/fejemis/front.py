@@ -2,8 +2,7 @@
 
 """The front Teensy: the steered wheel and its angle sensor, brush, lift, LEDs, infrared sensors.
 
-This module knows the simulated robot, and the front Teensy as its manual describes it. It must not
-know the drive Teensy.
+This module must not know the drive Teensy.
 """
 
 from collections.abc import Callable
@@ -31,15 +30,12 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``wanted_deg``: angle that the steered wheel must reach; None before the first ``rc`` command.
 
-    The caller simulates faults of the angle sensor with these attributes:
+    Faults of the angle sensor, which the caller may set:
 
-    ``diagnosis``, ``error_flags``: status bits that the ``fwl`` line reports. They do not include
-    the frame counter.
-
-    ``frozen``: whether the sensor repeats its last angle.
-
-    ``absent``: whether no sensor answers. If so, the Teensy reports the angle 0 and the status bits
-    of a sensor that has not finished its first measurement.
+    * ``diagnosis``, ``error_flags``: status bits of the ``fwl`` line, without the frame counter.
+    * ``frozen``: the sensor repeats its last angle.
+    * ``absent``: no sensor answers; the Teensy reports the angle 0 and a sensor without a
+      measurement.
     """
 
     version = 100
@@ -119,9 +115,9 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What the Teensy sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return a function for each line that the host can request. The function writes this line.
+        """Return, for each line that the host can request, the function that writes the line.
 
-        The keys are the names of the lines, as in the help text.
+        The keys are the lines' names in the help text.
         """
         return super().items() | {
             "hbt": lambda: (
@@ -207,10 +203,10 @@ class FrontTeensy(Teensy[FrontConfig]):
         }
 
     def _remote_control(self, rest: str) -> None:
-        """Set the angle that the wheel must reach. It is ``atan2(F w, v)``, limited to ±90°.
+        """Set the angle that the wheel must reach: ``atan2(F w, v)``, limited to ±90°.
 
-        ``v``, ``w``: commanded speed and turn rate. ``F``: distance from the axle to the front
-        wheel.
+        ``v``, ``w``: commanded speed and turn rate; both negated for a "mirrored" reverse. ``F``:
+        distance from the axle to the front wheel.
         """
         _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)

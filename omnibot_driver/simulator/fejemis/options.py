@@ -2,7 +2,7 @@
 
 """Command line options of a simulated Fejemis, except its seed and the faults of its lines.
 
-This module knows the options and their effects. It must not know what runs the boards.
+This module must not know the program that runs the boards.
 """
 
 import argparse

@@ -2,8 +2,7 @@
 
 """Settings of the two simulated Teensys and their robot: sizes, firmware, planned faults.
 
-``Firmware`` has one switch for each open point. A point is open if the manual does not decide it,
-or if the manual and other sources differ.
+``Firmware`` has one switch for each point that the manual leaves open or other sources contradict.
 """
 
 from dataclasses import dataclass, field
@@ -19,28 +18,17 @@ WHEEL_BASE_M = 0.40
 class Firmware:
     """Variant of the firmware. Each switch decides one point on which the sources differ.
 
-    ``sums``: lines carry the checksum ``;NN`` and are checked. If False, lines have none, as in the
-    manual.
-
-    ``reverse``: angle of the front wheel for driving backward. The value "mirrored" means: the same
-    angle as for driving forward on the same curve. The value "clamped" means: at most ±90°.
-
-    ``tilt``: ``pose`` has a fifth number, the tilt.
-
-    ``start_resumes``: after ``start``, the board obeys the last ``rc`` again, even one that it
-    received while stopped.
-
-    ``confirms``: a command after ``!`` is confirmed.
-
-    ``shows_source``: the drive's heartbeat shows the source of the last ``rc``. If False, the
-    heartbeat shows only 10 or -1.
-
-    ``single_precision``: times are float32, so after an hour they advance in steps of 0.2 ms.
-
-    ``says_start``: a boot ends with the line ``# Starting main loop``.
-
-    ``exact_words``: a command that has no numbers is recognised only if it is the whole line, as in
-    related firmware.
+    * ``sums``: lines carry the checksum ``;NN`` and are checked. The manual has none.
+    * ``reverse``: angle of the front wheel for driving backward: as for driving forward on the same
+      curve ("mirrored"), or at most ±90° ("clamped").
+    * ``tilt``: ``pose`` has a fifth number, the tilt.
+    * ``start_resumes``: ``start`` resumes the last ``rc``, even one received while stopped.
+    * ``confirms``: a command after ``!`` is confirmed.
+    * ``shows_source``: the drive's heartbeat shows the source of the last ``rc``, not only 10 or
+      -1.
+    * ``single_precision``: times are float32, with steps of 0.2 ms after an hour.
+    * ``says_start``: a boot ends with the line ``# Starting main loop``.
+    * ``exact_words``: a command without numbers must be the whole line, as in related firmware.
     """
 
     sums: bool = True
@@ -61,9 +49,9 @@ class Firmware:
 class Fault:
     """A planned fault of one Teensy.
 
-    ``at_s``: when the fault occurs, in s of simulated time since the board was constructed.
-
-    ``half``: the Teensy, ``drive`` or ``front``. ``what``: a name in ``faults.py``.
+    * ``at_s``: simulated time of the fault since the board was constructed, in s.
+    * ``half``: the Teensy, ``drive`` or ``front``.
+    * ``what``: a name in ``faults.py``.
     """
 
     at_s: float
@@ -75,30 +63,19 @@ class Fault:
 class FejemisSettings:
     """Settings of the two Teensys, their robot and its surroundings.
 
-    ``wheel_radius_scale``, ``track_scale``: true size divided by the configured size.
-
-    ``slip``: standard deviation, in m, of the random distance error when a wheel rolls 1 m.
-
-    ``ticks``: encoder ticks per revolution of the motor.
-
-    ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
-
-    ``servo_degps``: speed of the servo at the full command, 1000. With the default, the crossover
-    frequency of the manual's controller is 12 rad/s.
-
-    ``sensor_zero_deg``: zero offset of the angle sensor. The factory configuration corrects it.
-
-    ``clock_ppm``: rate errors of the two clocks. ``ids``: the Teensys' numbers in heartbeats. In
-    both pairs, the value of the drive Teensy comes first.
-
-    ``uptime_s``: how long the Teensys have run at construction. If longer than ``boot_s``, they
-    have booted.
-
-    ``swapped``: whether the drive Teensy is at the second port.
-
-    ``lose_inbound``: probability that a byte to a Teensy is lost.
-
-    ``front_m``: distance from the start to a wall in front.
+    * ``wheel_radius_scale``, ``track_scale``: true size divided by the configured size.
+    * ``slip``: standard deviation, in m, of the distance error of a wheel that rolls 1 m.
+    * ``ticks``: encoder ticks per revolution of the motor.
+    * ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
+    * ``servo_degps``: speed of the servo at the full command, 1000. The default fits the manual's
+      crossover frequency of 12 rad/s.
+    * ``sensor_zero_deg``: zero offset of the angle sensor, which the factory configuration
+      corrects.
+    * ``clock_ppm``, ``ids``: clock rate errors and heartbeat numbers of drive and front Teensy.
+    * ``uptime_s``: time since the boot at construction. Above ``boot_s``, the boot is over.
+    * ``swapped``: whether the drive Teensy is at the second port.
+    * ``lose_inbound``: probability that a byte to a Teensy is lost.
+    * ``front_m``: distance from the start to a wall in front.
     """
 
     firmware: Firmware = field(default_factory=Firmware)

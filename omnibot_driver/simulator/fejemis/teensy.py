@@ -2,8 +2,7 @@
 
 """The common part of both Teensys: lines, clock, subscriptions, identity, configuration memory.
 
-A control cycle takes a millisecond of the Teensy's own clock. This module must not know what either
-Teensy measures or moves.
+A control cycle is a millisecond of the Teensy's clock. This module must not know sensors or motors.
 """
 
 import struct
@@ -43,19 +42,16 @@ class Obeyed:
 class Teensy(Generic[C]):
     """The common part of the drive and the front Teensy.
 
-    ``commands``: the lines that the Teensy has executed, the newest last.
+    * ``commands``: executed lines, newest last.
+    * ``received``: all bytes that have reached the Teensy.
 
-    ``received``: all bytes that have reached the Teensy.
+    States that the caller may change at any time:
 
-    The caller may change these attributes at any time:
-
-    ``sums``: whether lines carry checksums.
-
-    ``silent``: whether the Teensy obeys commands, but sends nothing.
-
-    ``hung``: whether it neither obeys nor sends, and the motors keep their last speeds.
-
-    ``unplugged``: whether its cable is unplugged. ``powered``: whether it has power.
+    * ``sums``: lines carry checksums.
+    * ``silent``: the Teensy obeys, but sends nothing.
+    * ``hung``: the Teensy neither obeys nor sends; the motors keep their last speeds.
+    * ``unplugged``: the cable is unplugged.
+    * ``powered``: the Teensy has power.
     """
 
     version = 0
@@ -91,7 +87,7 @@ class Teensy(Generic[C]):
     def items(self) -> dict[str, Callable[[], str]]:
         """Return, for each line that the host can request, the function that writes the line.
 
-        The keys are the names of the lines, which are also used to subscribe to them.
+        The keys are the lines' names, as in the command ``sub``.
         """
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",

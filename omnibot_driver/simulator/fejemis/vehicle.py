@@ -2,8 +2,7 @@
 
 """The robot that the two Teensys move: driving wheels, servo of the steered wheel, lift, brush.
 
-This module knows speeds, angles and the resulting pose. It must not know the Teensys or their
-lines.
+This module must not know the Teensys or their lines.
 """
 
 from dataclasses import dataclass
@@ -33,9 +32,8 @@ class TrueState:
 class Servo:
     """The servo that turns the steered wheel. It takes a new command every 25 ms.
 
-    ``command``: wanted speed, -1000 to 1000. The speed follows with a lag.
-
-    ``angle_deg``: angle of the wheel, positive to the left.
+    * ``command``: wanted speed, -1000 to 1000, reached with a lag.
+    * ``angle_deg``: angle of the wheel, positive to the left.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -76,15 +74,12 @@ class Lift:
 
 
 class Vehicle:
-    """The robot with its true state.
+    """The robot with its true state. Pairs are for the left and the right wheel.
 
-    ``turns``: revolutions of the left and the right wheel since construction.
-
-    ``wanted_radps``: set-points of the speed controllers of the two wheels.
-
-    ``powered``: whether the controllers drive the wheels. Otherwise, the wheels coast to a stop.
-
-    ``held``: for each wheel, whether it is blocked by hand.
+    * ``turns``: revolutions since construction.
+    * ``wanted_radps``: set-points of the speed controllers.
+    * ``powered``: whether the controllers drive the wheels, which otherwise coast to a stop.
+    * ``held``: whether the wheels are blocked by hand.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -157,12 +152,13 @@ class Vehicle:
 def wheel_speeds(
     speed: float, turn_radps: float, angle_deg: float, base_m: float, steer_m: float
 ) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel in m/s, according to the manual.
+    """Return the speeds of the left and the right wheel in m/s, with the equations of the manual.
 
-    In the equations, ``v`` is the speed, ``w`` the turn rate, ``theta`` the angle of the front
-    wheel, ``B`` is ``base_m`` and ``f`` is ``steer_m``. Outer wheel: ``v2 = sqrt(v² + w²)`` with
-    the sign of ``v``. Inner wheel: ``v1 = v2 - v2 B / d``, where ``d`` is the larger of
-    ``f / tan(theta) + B / 2`` and ``B / 4``.
+    * Outer wheel: ``v2 = sqrt(v² + w²)`` with the sign of ``v``.
+    * Inner wheel: ``v1 = v2 - v2 B / d``, with ``d = max(f / tan(theta) + B / 2, B / 4)``.
+
+    ``v``: speed. ``w``: turn rate. ``theta``: angle of the front wheel. ``B``: ``base_m``. ``f``:
+    ``steer_m``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

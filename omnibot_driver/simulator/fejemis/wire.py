@@ -2,19 +2,16 @@
 
 """Reads and writes lines of text as a Teensy does, according to the manual and public programs.
 
-Checksum ``;NN``: 1 plus the sum, modulo 99, of the codes of all characters after it, except control
-characters (below 0x20). Numbers are parsed as by C's ``strtof``. This module must not know the
-meaning of a command.
+Checksum ``;NN``: 1 plus the sum, modulo 99, of the following character codes without control
+characters (below 0x20). Numbers are parsed as by C's ``strtof``. This module must not know
+commands.
 """
 
 import re
 from enum import Enum
 
 BUFFER = 200
-"""How many characters the line buffer holds.
-
-If a line is longer, the characters in the full buffer are discarded.
-"""
+"""Size of the line buffer, in characters. A longer line loses the characters in the full buffer."""
 
 _CONTROL_CHARACTERS = bytes(range(0x20))
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
@@ -45,10 +42,9 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Check the checksum of a line.
+    """Return the result of the check, the line without ``;NN``, and its correct checksum.
 
-    Return three values: the result of the check, the line without ``;NN``, and the checksum that
-    the line should have. If the line has no ``;NN``, the third value is 0.
+    The checksum is 0 if the line has no ``;NN``.
     """
     found = _PREFIX.match(text)
     if found is None:

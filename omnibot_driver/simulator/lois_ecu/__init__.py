@@ -2,8 +2,7 @@
 
 """The LOIS ECU in software, as its manual describes it or as its public firmware behaves.
 
-This package must share no code with the driver: tests would not find a shared error.
-``SimulatedLois`` reads no clock and no port.
+The package must share no code with the driver. ``SimulatedLois`` reads no clock and no port.
 """
 
 from omnibot_driver.simulator.lois_ecu.board import CHANNELS, SimulatedLois

@@ -2,11 +2,13 @@
 
 """The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
-The simulation is deterministic. Assumptions beyond the manual: set-points never expire, ticks wrap
-at 2³², and the e-stop button zeroes set-points when it is pressed, and again when it is released.
+The simulation is deterministic. Three assumptions are not in the manual:
 
-This module knows the manual's table of messages and, through ``Quirks``, the public firmware. It
-does not know ports or real time.
+* Set-points never expire.
+* Ticks wrap at 2³².
+* The e-stop button zeroes set-points when it is pressed and when it is released.
+
+This module does not know ports or real time.
 """
 
 from collections import deque
@@ -36,9 +38,10 @@ GPS_SENTENCE_S = 1.0
 class SimulatedLois:
     """One board with its robot.
 
-    tick: number of ticks of 10 ms since construction.
-    commands: valid lines that the board processed, newest last.
-    motors: the true motors. wheels: the wheels as the board measures them.
+    * ``tick``: number of ticks of 10 ms since construction.
+    * ``commands``: valid lines that the board processed, newest last.
+    * ``motors``: the true motors.
+    * ``wheels``: the wheels as the board measures them.
     """
 
     channels = CHANNELS
@@ -120,9 +123,8 @@ class SimulatedLois:
     def terminal_mode(self) -> int:
         """Terminal mode that the last command 0x11 set.
 
-        In other modes than 0 and 4, the board sends no periodic messages and no records. In these
-        modes, it reports the e-stop button, unless the board has the quirk
-        ``button_is_lost_in_terminal_mode``.
+        In other modes than 0 and 4, the board sends no periodic messages or records, and with the
+        quirk ``button_is_lost_in_terminal_mode`` no reports of the e-stop button.
         """
         return self._terminal.mode
 
@@ -281,10 +283,7 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Run the main loop for 1 ms.
-
-        In this time, the loop completes the current check of all timers, and checks them once more.
-        """
+        """Run the main loop for 1 ms: complete the check of all timers, and repeat the check."""
         for _ in range(2):
             if not self._scan:
                 if self._uart.input:

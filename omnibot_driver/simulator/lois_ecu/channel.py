@@ -2,8 +2,7 @@
 
 """One wheel as the board sees it. Input: encoder edges; output: ticks, speed and motor duty.
 
-This module knows the firmware's quirks of counting and measuring. It does not know the protocol or
-the other wheel.
+This module does not know the protocol.
 """
 
 from math import copysign
@@ -16,9 +15,8 @@ TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_PER_TURN_US = 300_000
-"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. This time
-divided by the edges per turn is a limit: the board computes no speed from a shorter encoder
-level."""
+"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. Encoder levels
+shorter than this time divided by the edges per turn give no speed."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024
@@ -28,11 +26,11 @@ STALE_S = 0.25
 class WheelChannel:
     """One wheel of the board, with its encoder counter and its speed controller.
 
-    ``corrections``: factors for the durations of the encoder's short and long level.
-    ``steps``: encoder edges per turn.
-    ``ticks``: encoder ticks, as 0x12 reports them.
-    ``open_loop``: whether a duty is commanded, not a speed.
-    ``record_left``: number of samples that the record in progress still needs.
+    * ``corrections``: factors for the durations of the encoder's short and long level.
+    * ``steps``: encoder edges per turn.
+    * ``ticks``: encoder ticks, as 0x12 reports them.
+    * ``open_loop``: whether a duty is commanded, not a speed.
+    * ``record_left``: samples that the record in progress still needs.
     """
 
     def __init__(
@@ -95,7 +93,8 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this. With the quirk ``keeps_speed_of_stalled_wheel``, the speed stays.
+        With the quirk ``keeps_speed_of_stalled_wheel``, the speed stays. The manual only implies a
+        reset.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0

@@ -21,9 +21,7 @@ BALL_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A line that the board has processed.
-
-    The line has a valid form, but the board may not know its command.
+    """A line of valid form that the board has processed, even if the command is unknown.
 
     ``tick``: number of the tick in which the line was processed.
     """
@@ -48,8 +46,8 @@ class Parts:
 class Commands:
     """Executes commands.
 
-    led: whether the LED is on.
-    balls: number of balls dropped. A reboot does not reset it.
+    * ``led``: whether the LED is on.
+    * ``balls``: number of balls dropped, which a reboot does not reset.
     """
 
     def __init__(self, quirks: Quirks) -> None:

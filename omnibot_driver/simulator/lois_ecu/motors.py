@@ -2,8 +2,7 @@
 
 """A motor with its wheel and encoder, and the board's speed controller for it.
 
-Speeds are in RPM, efforts in percent of duty. This module knows time steps. It does not know
-commands or the protocol.
+Speeds are in RPM, efforts in percent of duty. This module does not know commands.
 """
 
 from collections import deque
@@ -93,13 +92,13 @@ class Motor:
 
 
 class Encoder:
-    """An encoder disc. Short and long levels alternate; a period is a short and a long level.
+    """An encoder disc, on which short and long levels alternate.
 
-    ``steps``: edges per turn.
+    A period is one level of each length.
 
-    ``short``: length of the short level, as a fraction of a period.
-
-    ``noise``: standard deviation of a level's length, as a fraction of half a period.
+    * ``steps``: edges per turn.
+    * ``short``: length of the short level, as a fraction of a period.
+    * ``noise``: standard deviation of a level's length, as a fraction of half a period.
     """
 
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
@@ -118,9 +117,8 @@ class Encoder:
     def turn(self, turns: float) -> list[tuple[float, bool, int]]:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
-        An edge has three values. The first is its time, as a fraction of the step. The second is
-        True if a long level ended at this edge. The third is the direction of the disc: 1 forward,
-        -1 backward.
+        An edge has its time as a fraction of the step, whether a long level ended, and 1 (forward)
+        or -1.
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
@@ -158,9 +156,8 @@ class Encoder:
 class Gains:
     """Gains of the manual's speed controller.
 
-    feed_forward: in percent of duty per RPM.
-    low_pass: 0..1. In each step, the controller's target changes by this part of its difference to
-        the commanded target.
+    * ``feed_forward``: in percent of duty per RPM.
+    * ``low_pass``: 0..1, the part of a change of the target that each step takes over.
     """
 
     kp: float
@@ -173,8 +170,8 @@ class Gains:
 class SpeedController:
     """The board's speed controller, with measured and target RPM as input and a duty as output.
 
-    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule. The coefficients
-    are always for ``NOMINAL_STEP_S``.
+    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule for
+    ``NOMINAL_STEP_S``, even if the true step differs.
     """
 
     def __init__(self, gains: Gains) -> None:

@@ -2,7 +2,7 @@
 
 """The board's own odometry, as the manual describes it and as the firmware computes it.
 
-This module knows wheels and their nominal geometry. It does not know the true pose of the robot.
+This module does not know the true pose of the robot.
 """
 
 from math import cos, inf, nan, pi, sin
@@ -17,8 +17,8 @@ SLOW_COUNT_S = 7251 / 72e6
 class DocumentedOdometry:
     """Odometry from signed ticks and measured speeds, as the manual describes it.
 
-    pose: x and y in m, and yaw in rad.
-    velocity: dx and dy in m/s along the axes of the pose, and dyaw in rad/s.
+    * ``pose``: x and y in m, and yaw in rad.
+    * ``velocity``: along the axes of the pose, in m/s, m/s and rad/s.
     """
 
     def __init__(self, steps: int, radius_m: float, track_m: float) -> None:
@@ -53,10 +53,9 @@ class DocumentedOdometry:
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each encoder tick, from the latest RPMs.
 
-    ``stands``: whether the position does not change while both RPMs are equal.
-    ``divides``: whether the velocity is NaN or infinite if two ticks have the same time. The reason
-    is that the firmware then divides by zero.
-    ``slow``: whether each count of the timer takes 0.7 % too long.
+    * ``stands``: the position does not change while both RPMs are equal.
+    * ``divides``: the velocity is NaN or infinite if two ticks have the same time.
+    * ``slow``: each count of the timer takes 0.7 % too long.
     """
 
     def __init__(

@@ -2,8 +2,7 @@
 
 """Options of a simulated LOIS ECU, except its seed and the faults of its line.
 
-This module knows the names, values and effects of options. It does not know which program runs the
-board.
+This module does not know which program runs the board.
 """
 
 import argparse

@@ -2,8 +2,7 @@
 
 """Records of tick times, torques and headings. A record is sampled, then encoded as lines.
 
-This module knows the values that the board measures on its wheels. It does not know when the lines
-are sent.
+This module does not know when the lines are sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire

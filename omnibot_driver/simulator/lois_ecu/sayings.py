@@ -2,7 +2,7 @@
 
 """The board's periodic messages as lines: GPS position, time, date, heading, ticks, odometry.
 
-This module knows where each value comes from. It does not know when a message is sent.
+This module does not know when a message is sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -14,9 +14,9 @@ from omnibot_driver.simulator.lois_ecu.vehicle import Vehicle
 
 
 class Sayings:
-    """The periodic messages of one board, as lines. Each boot of the board creates a new instance.
+    """The periodic messages of one board, as lines. Each boot creates a new instance.
 
-    began_s: time of the boot, at which the board's clock in ns starts from zero.
+    ``began_s``: time of the boot, at which the board's clock in ns starts from zero.
     """
 
     def __init__(

@@ -13,44 +13,44 @@ from typing import Literal
 class Quirks:
     """Deviations of the public firmware from the manual.
 
-    By default, all are off. In ``FIRMWARE``, all are on. Numbers such as 0x12 are the manual's
-    command numbers. Fields whose names explain themselves are not listed.
+    All are off by default, and on in ``FIRMWARE``.
 
-    ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
-    odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
-        are equal.
-    velocity_may_be_nan: two ticks within one timer count cause a division by zero. 0x20 then
-        contains NaN or infinity.
-    sign_of_command: the measured speed has the sign of the target, not of the wheel.
-    duty_drags_target: while a negative duty is commanded, each encoder tick lowers an RPM target of
-        0 or less by 1. This requires ticks_of_forward_targets.
-    reverse_runs_fast: while the controller's duty is negative, each encoder tick lowers an RPM
-        target of 0 or less by 1. The controller's next step uses the lower target, then restores
-        the target. This requires ticks_of_forward_targets.
-    low_pass_starts_at_zero: wheels ignore RPM targets until 0x23 is written.
-    extra_settings: the settings 0x21 to 0x23 exist.
-    appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
-    clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
-    deaf_while_sending: while the board sends, it keeps only the first character that arrives.
-    deaf_while_counting: at each encoder tick, the board receives nothing for 0.2 ms.
-    button_waits_while_sending: a press stops the motors only after the message or record that the
-        board is sending.
-    odometry_period_is_fixed: writing the period of 0x20 has no effect.
-    terminal_mode_zeroes_correction: each 0x11 zeroes the left wheel's correction of short levels.
-    terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
-    reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
-    terminal_passes_input_on: in a terminal mode, the board forwards its input to the sensor, at
-        9600 or 4800 baud, before it reads the input itself.
-    headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
-    records_in_100_us: the samples of an RPM record are in 100 µs, not in 100 ns.
-    torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
-    record_waits_for_one_more: a record of n headings is sent when sample n + 1 arrives.
-    large_records_never_end: a record of more than 1024 samples is never complete.
-    lenient_hex: a field that is not hexadecimal is accepted if the checksum is right.
-    limits_rpm: targets are limited to 50 RPM.
-    fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
-    slow_timer: a count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
-    slow_boot: the board does not react for 2 s after power-up. It then reads what came meanwhile.
+    Numbers such as 0x12 are the manual's command numbers. Fields with clear names are not listed.
+
+    * ``ticks_of_forward_targets``: ticks count up, and only while the wheel's RPM target is
+      positive.
+    * ``odometry_stands_at_equal_speeds``: the position in 0x20 is constant while both RPMs are
+      equal.
+    * ``velocity_may_be_nan``: two ticks in one timer count give NaN or infinity in 0x20.
+    * ``sign_of_command``: the measured speed has the sign of the target.
+    * ``duty_drags_target``: at a commanded negative duty, each tick lowers an RPM target of 0 or
+      less by 1. Requires ``ticks_of_forward_targets``.
+    * ``reverse_runs_fast``: at a negative duty of the controller, each tick lowers an RPM target of
+      0 or less by 1, until the controller's next step. Requires ``ticks_of_forward_targets``.
+    * ``low_pass_starts_at_zero``: wheels ignore RPM targets until 0x23 is written.
+    * ``extra_settings``: the settings 0x21 to 0x23 exist.
+    * ``appends_odometry``: 0x12 also sends the odometry, after the ticks.
+    * ``clock_in_ms``: the timestamp of 0x12 is in ms, not in ns.
+    * ``deaf_while_sending``: while the board sends, it keeps only the first character that arrives.
+    * ``deaf_while_counting``: the board receives nothing for 0.2 ms after each encoder tick.
+    * ``button_waits_while_sending``: the button takes effect only after the current message or
+      record.
+    * ``odometry_period_is_fixed``: writing the period of 0x20 has no effect.
+    * ``terminal_mode_zeroes_correction``: 0x11 zeroes the left wheel's correction of short levels.
+    * ``terminal_mixes_sensors``: each terminal mode forwards both sensors, character by character.
+    * ``reset_clears_ticks_only``: 0x18 keeps the odometry and the set-points.
+    * ``terminal_passes_input_on``: in a terminal mode, input first goes to the sensor, at 9600 or
+      4800 baud.
+    * ``headings_average_over_north``: the mean heading of 359, 1 and 1 is 120.
+    * ``records_in_100_us``: the samples of an RPM record are in 100 µs, not in 100 ns.
+    * ``torque_comes_as_rpm``: the reply to 0x17 has command number 0x04.
+    * ``record_waits_for_one_more``: a record of n headings is sent after sample n + 1.
+    * ``large_records_never_end``: a record of more than 1024 samples is never complete.
+    * ``lenient_hex``: fields need not be hexadecimal if the checksum is right.
+    * ``limits_rpm``: targets are limited to 50 RPM.
+    * ``fast_control``: the controller runs every 91 ms, with the coefficients for 200 ms.
+    * ``slow_timer``: a count takes 100.7 µs instead of 100 µs, so speeds are 0.7 % too high.
+    * ``slow_boot``: for 2 s after power-up, the board only stores its input.
     """
 
     ticks_of_forward_targets: bool = False
@@ -99,13 +99,10 @@ QUIRKS: dict[Firmware, Quirks] = {"documented": DOCUMENTED, "firmware": FIRMWARE
 class MotorSettings:
     """A first-order motor with dry friction.
 
-    rpm_per_percent: speed in RPM for each percent of duty beyond the dead zone.
-
-    friction_rpm_per_s: additional deceleration without power.
-
-    second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
-
-    backlash_turns: play between motor and encoder, in turns of the wheel.
+    * ``rpm_per_percent``: speed in RPM per percent of duty beyond the dead zone.
+    * ``friction_rpm_per_s``: additional deceleration without power.
+    * ``second_time_constant_s``, ``dead_time_s``: lag and delay of the power stage.
+    * ``backlash_turns``: play between motor and encoder, in turns of the wheel.
     """
 
     rpm_per_percent: float = 0.66
@@ -121,14 +118,15 @@ class MotorSettings:
 class LoisSettings:
     """The board, its robot, and its position on Earth.
 
-    steps: nominal encoder edges per turn.
-    wheel_radius_scale, track_scale: true value divided by nominal value.
-    slip: standard deviation, in m, of the random distance error when a wheel rolls 1 m.
-    load_percent: standard deviation of the load from the ground, in percent of duty.
-    mark_noise: standard deviation of the distance between adjacent encoder marks, in half periods.
-    start_latitude_deg, start_longitude_deg: position of x = y = 0. The x axis points east.
-    heading_noise_deg: standard deviation of each raw heading.
-    running: whether the board has already booted.
+    * ``steps``: nominal encoder edges per turn.
+    * ``wheel_radius_scale``, ``track_scale``: true value divided by nominal value.
+    * ``slip``: standard deviation, in m, of the distance error of a wheel that rolls 1 m.
+    * ``load_percent``: standard deviation of the load from the ground, in percent of duty.
+    * ``mark_noise``: standard deviation of the distance between encoder marks, in half periods.
+    * ``start_latitude_deg``, ``start_longitude_deg``: position of x = y = 0. The x axis points
+      east.
+    * ``heading_noise_deg``: standard deviation of each raw heading.
+    * ``running``: whether the board has already booted.
     """
 
     quirks: Quirks = FIRMWARE

@@ -2,8 +2,7 @@
 
 """The terminal mode: characters that pass between the board's sensors and the host.
 
-This module knows characters and which sensor sent them. It does not know the protocol, nor when the
-board sends.
+This module knows characters and their sensors. It does not know the protocol.
 """
 
 from collections import deque

@@ -2,8 +2,7 @@
 
 """Initial parameters of the wheels' controllers and encoders, and the commands that change them.
 
-This module knows the commands that write one number each. It does not know the text lines in which
-the commands come.
+This module does not know the text lines of the commands.
 """
 
 from omnibot_driver.simulator.lois_ecu.channel import WheelChannel

@@ -2,10 +2,8 @@
 
 """The board's serial port at 115200 baud: the characters that it receives and sends.
 
-The board sends some data with interrupts off. During this time it can lose received characters.
-
-This module handles single characters in steps of 1 ms. It does not know where a message begins or
-ends.
+The board can lose characters while it sends with interrupts off. This module does not know
+messages.
 """
 
 from collections import deque
@@ -18,10 +16,8 @@ INPUT_DEPTH = 600
 class Uart:
     """The serial port.
 
-    ``loses``: whether the port keeps only the first of the bytes that arrive while interrupts are
-    off, and loses the others.
-
-    ``input``: characters that were received but not read yet.
+    * ``loses``: whether only the first of the bytes that arrive while interrupts are off is kept.
+    * ``input``: characters that were received but not read yet.
     """
 
     def __init__(self, *, loses: bool) -> None:
@@ -88,8 +84,7 @@ class Uart:
     def send(self, sent: bytearray) -> bool:
         """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
-        Return True if data that is sent with interrupts off ends in this step. Interrupts are then
-        on again, and the caller must call ``hear_kept``.
+        Return True if data that is sent with interrupts off has ended. Then call ``hear_kept``.
         """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, MOST_CREDIT)
         while self._sending and self._out_credit >= 1.0:

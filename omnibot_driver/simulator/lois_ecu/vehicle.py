@@ -2,7 +2,7 @@
 
 """The robot that a simulated LOIS ECU drives: two wheels on the ground, and the resulting motion.
 
-This module knows duties and the positions of the encoder marks. It does not know the board.
+This module does not know the board.
 """
 
 from dataclasses import dataclass
@@ -42,8 +42,8 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: for each encoder, the two factors with which the board corrects short and long
-    levels. The simulated levels have exactly the lengths for which these factors are right.
+    ``corrections``: for each encoder, the board's factors for short and long levels. The simulated
+    levels fit these factors exactly.
     """
 
     def __init__(

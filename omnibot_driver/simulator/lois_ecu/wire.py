@@ -2,10 +2,9 @@
 
 """The protocol as the board encodes and decodes it, from the manual and the public firmware.
 
-A line has a ``:``, the command as 2 hexadecimal digits, the payload as 8 digits, the checksum as 2
-digits, and a line feed. The checksum is the XOR of all characters that precede the checksum.
-
-This module shares no code with the driver. It does not know what a command means.
+A line: ``:``, command (2 hexadecimal digits), payload (8), checksum (2: XOR of all characters
+before it), line feed. This module shares no code with the driver, and does not know what a command
+means.
 """
 
 import re
@@ -61,9 +60,9 @@ def sequence(command: int, payloads: list[int]) -> bytes:
 class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
-    ``checks``: whether lines have a checksum.
-    ``lenient``: whether fields are read as by C's strtol: blanks, a sign and 0x may precede the
-    digits, and what follows the digits is ignored.
+    * ``checks``: whether lines have a checksum.
+    * ``lenient``: whether fields are read as by C's strtol, with blanks, a sign and 0x allowed
+      before the digits and any text after them.
     """
 
     def __init__(self, *, lenient: bool) -> None:

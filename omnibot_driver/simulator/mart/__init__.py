@@ -2,8 +2,7 @@
 
 """A simulated MART motion controller that follows its manual or its public server.
 
-It shares no code with the driver. ``MartServer`` uses no sockets, threads or real time;
-``SimulatedMart`` gives it the interface of simulated boards, for real ports and ``sim://``.
+The package shares no code with the driver. ``MartServer`` uses no sockets, threads or real time.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Supervision of a motion in progress, 100 times a second.
+"""Supervision of a motion in progress, 100 times a second, as in the real server.
 
-It works like the supervision in the real server. It detects that the robot starts, stops or comes
-near an obstacle, and it ends controlled moves.
-
-This module knows motions; it does not know commands.
+It detects starts, stops and near obstacles, and ends controlled moves. This module does not know
+commands.
 """
 
 from typing import TYPE_CHECKING
@@ -151,8 +149,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    This function reproduces an error of the server, which adds two numbers of different units. The
-    distance of acceleration and deceleration is in feet; the remaining distance is in inches.
+    The error of the server is reproduced: the distance of acceleration and deceleration is added in
+    feet.
     """
     if motion.kind not in _TIMED:
         return 0.0
@@ -187,13 +185,11 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 
 
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
-    """Change the speeds of both wheels.
+    """Change the speeds of both wheels, in units of the motor registers; forward is positive.
 
-    ``right``, ``left``: changes in units of the motor registers; forward is positive.
-
-    A wheel that would exceed the full speed gets the full speed, and the other wheel becomes slower
-    by the excess. Full speed is 128 units forward, and 127 units backward. A wheel that would
-    change its direction stops.
+    * Above full speed (128 units forward, 127 backward): full speed, and the other wheel becomes
+      slower by the excess.
+    * A change of direction: the wheel stops.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

@@ -2,8 +2,7 @@
 
 """The motor board, its two motors, and the robot that they move.
 
-Motor registers: 0 full forward, 128 stop, 255 full backward. This module knows registers, volts and
-metres; it does not know commands or why the robot moves.
+Motor registers: 0 full forward, 128 stop, 255 full backward. This module does not know commands.
 """
 
 from math import cos, exp, inf, pi, sin
@@ -13,10 +12,8 @@ from omnibot_driver.simulator.mart.settings import MartSettings, Stuck
 STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
-"""Number of updates of the applied effort per second.
-
-At each update, every 25 ms, the effort changes by at most the set acceleration.
-"""
+"""Number of updates of the applied effort per second. Each changes the effort by at most the set
+acceleration."""
 STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 
@@ -24,12 +21,13 @@ RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 class Chassis:
     """The motor board with its motors, its encoder and the body of the robot.
 
-    right, left: registers of the two motors.
-    x_m, y_m, yaw_rad: the true pose, yaw unwrapped.
-    counts: encoder counts since the last reset.
-    way_m: total distance, forward and backward.
-    silent: whether the serial line to the motor board is cut.
-    volts, stuck, motor_status and silent may be set only by ``change``.
+    * ``right``, ``left``: motor registers.
+    * ``x_m``, ``y_m``, ``yaw_rad``: the true pose, yaw unwrapped.
+    * ``counts``: encoder counts since the last reset.
+    * ``way_m``: total distance, forward and backward.
+    * ``silent``: whether the serial line to the motor board is cut.
+
+    Set ``volts``, ``stuck``, ``motor_status`` and ``silent`` only through ``change``.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -128,10 +126,7 @@ class Chassis:
 
     @property
     def rests(self) -> bool:
-        """Whether the robot is at rest and will stay at rest.
-
-        This is true if commands, applied efforts and wheel speeds are all zero.
-        """
+        """Whether the robot stays at rest: commands, applied efforts and wheel speeds are zero."""
         return not (self.powered or self.moving or self._applied_right or self._applied_left)
 
     @property
@@ -182,12 +177,10 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """Return the distance in m from a sonar to the wall in its direction.
+    """Return the distance in m from a sonar to the wall in its direction; infinity without a wall.
 
-    The result is infinity if the sonar faces no wall.
-
-    ``backward``: whether it is the rear sonar; else it is the front sonar. The walls lie across
-    the x axis, at ``front_m`` and ``-rear_m``.
+    ``backward``: whether it is the rear sonar. The walls cross the x axis at ``front_m`` and
+    ``-rear_m``.
     """
     along = cos(chassis.yaw_rad + (pi if backward else 0.0))
     if along > 0.3:

@@ -2,8 +2,7 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The table of commands is searched from the top, and the first row that fits the request is used.
-This module knows command words and numbers; it does not know how a motion proceeds.
+The first row that fits a request is used. This module does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -22,10 +21,7 @@ It returns the reply, or None if the reply comes later or never.
 """
 
 NEED_ALL = ("VOLTS", "RM ", "MCF", "MCB", "TF", "PTF", "TB", "R", "L", "MCR", "MCL")
-"""Commands that crash a server that is still starting up.
-
-They need objects that the server creates only after it has opened its ports.
-"""
+"""Commands that crash a server that is still starting up."""
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
 BAD_DISTANCE = "fail bad distance value"
@@ -34,10 +30,9 @@ BAD_DISTANCE = "fail bad distance value"
 class Row(NamedTuple):
     """A command and its handler.
 
-    word: the complete command, or its beginning if ``begins``.
-
-    moves: whether the server refuses the command while a motion, a recording or direct control of
-    the motors (MCS) is in progress.
+    * ``word``: the complete command, or its beginning if ``begins``.
+    * ``moves``: whether a motion, a recording or direct control of the motors (MCS) blocks the
+      command.
     """
 
     word: str
@@ -85,10 +80,9 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _refuses_left_spin(server: "MartServer") -> bool:
-    """Return whether the server refuses the spin L.
+    """Return whether the server refuses the spin L, because of a motion, a recording or MCS.
 
-    It refuses L during a motion, a recording or direct control of the motors (MCS). With the quirk
-    ``left_spin_in_reference_move``, it accepts L during the forward drive RM.
+    With the quirk ``left_spin_in_reference_move``, the forward drive RM is not a reason.
     """
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
@@ -97,10 +91,10 @@ def _refuses_left_spin(server: "MartServer") -> bool:
 
 
 def _timed(server: "MartServer", text: str) -> str | None:
-    """Start a straight controlled move (TF, TB).
+    """Start a straight controlled move (TF, TB) by a distance in inches.
 
-    The request has an optional speed word, then a distance in inches. Without the quirk
-    ``speed_word_first``, the speed word may also follow the distance.
+    An optional speed word comes before the distance; without the quirk ``speed_word_first``, it may
+    also come after it.
     """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]

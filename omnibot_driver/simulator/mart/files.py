@@ -27,11 +27,11 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FileNote:
-    """The data from which the server's file about a motion is made.
+    """The data for the server's file about a motion.
 
-    head: first lines of the file.
-    rows: number of samples in the file.
-    angle_deg, encoder: values at the end of the motion.
+    * ``head``: first lines of the file.
+    * ``rows``: number of samples in the file.
+    * ``angle_deg``, ``encoder``: values at the end of the motion.
     """
 
     name: str

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The IMU: its gyro, whether the IMU works, and the heading that the server computes.
+"""The IMU: its gyro, whether the IMU works, and the heading that the server computes from the gyro.
 
-The server computes the heading from the gyro. This module knows turn rates and times; it does not
-know motions or commands.
+This module does not know motions or commands.
 """
 
 from omnibot_driver.simulator.mart.settings import MartSettings
@@ -12,12 +11,11 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    alive: whether the IMU is plugged in. The caller can set it. In addition, the settings can plan
-    a time in which the IMU does not work.
-    closed: whether the server has stopped using the IMU. The server uses it again after a
-    successful RST IMU or SB.
-    rate_dps: turn rate of the last sample in degrees/s, minus the bias that the server knows.
-    heading_deg: the relative heading in degrees, positive to the left.
+    * ``alive``: whether the IMU is plugged in; set by the caller. The settings can also plan a
+      failure.
+    * ``closed``: whether the server has stopped using the IMU (until RST IMU or SB succeeds).
+    * ``rate_dps``: last turn rate in degrees/s, minus the bias that the server knows.
+    * ``heading_deg``: the relative heading in degrees, positive to the left.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -66,8 +64,8 @@ class Imu:
     def drift(self, now: float, *, integrates: bool) -> None:
         """Advance to ``now``. The robot has been at rest since the previous sample.
 
-        ``integrates``: whether the heading drifts in this time. It drifts because the server knows
-        only a part of the gyro's bias; the rest of the bias is the rate of the drift.
+        ``integrates``: whether the heading drifts at the part of the gyro's bias that the server
+        does not know.
         """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)

@@ -54,20 +54,13 @@ RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
 class Motion:
     """The state of the last motion of a kind, kept after its end.
 
-    running: whether the motion is in progress; the server then refuses other motions.
-
-    watching: whether the module ``alarms`` supervises the motion.
-
-    posts: number of reports of a start or an end of a motion of this kind that the server keeps
-    for its method ``wait``.
-
-    right, left: motor registers, as the server knows them.
-
-    sampled_s: time of the last sample of the IMU, or -1.
-
-    moved_s, turned_s: first and last time at which the right wheel turned.
-
-    released: whether the stop port ended the motion.
+    * ``running``: whether the motion is in progress; the server then refuses other motions.
+    * ``watching``: whether the module ``alarms`` supervises the motion.
+    * ``posts``: reported starts and ends for which no port has waited yet.
+    * ``right``, ``left``: motor registers, as the server knows them.
+    * ``sampled_s``: time of the last sample of the IMU, or -1.
+    * ``moved_s``, ``turned_s``: first and last time at which the right wheel turned.
+    * ``released``: whether the stop port ended the motion.
     """
 
     def __init__(self, kind: Kind) -> None:

@@ -2,9 +2,8 @@
 
 """The start of each kind of motion, and its end by a command.
 
-A start or an end has several steps. Each step is a function that the server calls later. The
-function gets the server as an argument, so a copy of the server can call the later steps, too. This
-module knows motions; it does not know the words of commands.
+The server calls the steps later, with itself or its copy as an argument. This module does not know
+the words of commands.
 """
 
 from typing import TYPE_CHECKING
@@ -24,8 +23,7 @@ PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
 LINEAR_S = REFERENCE_S = 0.015
-"""Time in s in which the server sets up the motor board before a motion. ``LINEAR_S``: before a
-linear move. ``REFERENCE_S``: before a reference move."""
+"""Time in s in which the server sets up the motor board before a linear or reference move."""
 
 
 def start_linear(server: "MartServer", word: str, *, backward: bool) -> None:
@@ -85,9 +83,9 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
     """Take a sample of the gyro bias, before a motion or for the bias measurement SB.
 
-    ``left``: number of samples still to take. ``missed``: number of samples in a row that have
-    failed. ``kind``: the motion that starts after the last sample; if None, the server answers SB
-    instead.
+    * ``kind``: the motion that starts after the last sample; None for SB.
+    * ``left``: samples still to take.
+    * ``missed``: samples in a row that have failed.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
@@ -155,8 +153,8 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    An angle of 0 degrees or less only tests the IMU. With the quirk ``probe_turns``, the motors run
-    during this test, too.
+    An angle of 0 degrees or less only tests the IMU, but with the quirk ``probe_turns``, the motors
+    run.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word

@@ -2,7 +2,7 @@
 
 """The server: two ports with a thread each, a timer while something moves, and simulated time.
 
-Equal input gives equal output. This module does not know sockets, real time or the set of commands.
+Equal input gives equal output. This module does not know sockets or real time.
 """
 
 from collections import deque
@@ -18,9 +18,9 @@ from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
 QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
-"""``BOOT_S``: time in s from a restart of the program until it opens its ports.
+"""``BOOT_S``: time in s from a restart of the program until its ports are open.
 
-``START_UP_S``: time in s from the opening of the ports until it has started up completely.
+``START_UP_S``: time in s from then until the program has started up completely.
 """
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
@@ -48,8 +48,8 @@ class _Later(NamedTuple):
 class MartServer(ServerState):
     """The controller with its robot. ``receive`` and ``advance`` move the simulated time forward.
 
-    received: the last datagrams at both ports, each with its time and port.
-    executed: the last commands that the server began.
+    * ``received``: the last datagrams at both ports, each with its time and port.
+    * ``executed``: the last commands that the server began.
     """
 
     def __init__(self, settings: MartSettings | None = None) -> None:
@@ -122,8 +122,8 @@ class MartServer(ServerState):
     def restart(self, boot_s: float = BOOT_S) -> None:
         """Restart the server program. The motors keep the last command that they received.
 
-        Datagrams of the next ``boot_s`` seconds are lost. After another ``START_UP_S`` seconds, the
-        server has started up completely.
+        Datagrams of the next ``boot_s`` seconds are lost. The start-up takes ``START_UP_S`` more
+        seconds.
         """
         self.begin()
         self.imu.restart()
@@ -171,8 +171,7 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
 
-        If ``post`` has kept such a report, because no port waited for it, use this report, and call
-        ``then`` now.
+        If ``post`` has kept an earlier report, ``then`` is called at once.
         """
         motion = self.motions[kind]
         if motion.posts:
@@ -185,7 +184,7 @@ class MartServer(ServerState):
     def post(self, kind: Kind) -> None:
         """Report the start or the end of a motion of ``kind`` to the first port that waits for it.
 
-        If no port waits for such a report, keep the report for the next ``wait``.
+        If no port waits, the report is kept for the next ``wait``.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -2,8 +2,7 @@
 
 """The commands that do not start a motion: queries, clock, log, files, direct motor control.
 
-This module knows the replies to these commands, and when they come. It does not know how the server
-recognises a command.
+This module does not know how the server recognises a command.
 """
 
 import calendar
@@ -32,9 +31,7 @@ Handler = Callable[["MartServer", str], str | None]
 def missing(server: "MartServer", what: str) -> str | None:
     """Refuse a command that has too few numbers.
 
-    A server with the quirk ``crashes_on_missing_numbers`` does not refuse the command, but ends.
-
-    ``what``: the reason to record if the server ends.
+    With the quirk ``crashes_on_missing_numbers``, the server ends instead, for the reason ``what``.
     """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
@@ -132,10 +129,9 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 
 
 def take_bias(server: "MartServer", text: str) -> str | None:
-    """Measure the gyro bias (SB).
+    """Measure the gyro bias (SB). An IMU that the server has stopped using is opened first.
 
-    If the server has stopped using the IMU, it opens the IMU before the measurement. If the IMU
-    does not answer at this time, SB fails.
+    SB fails if this IMU does not answer.
     """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
@@ -263,7 +259,7 @@ def set_motors(server: "MartServer", text: str) -> str | None:
 
 
 def stop_motors(server: "MartServer", text: str) -> str | None:
-    """Handle the command MSM. It stops the motors if the command MCS has set their registers."""
+    """Stop motors whose registers the command MCS has set (MSM)."""
     if server.manual:
         server.manual = False
         server.drive(128, 128)

@@ -12,43 +12,41 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quirks:
-    """Deviations of the public server from its manual.
+    """Deviations of the public server from its manual. By default, all are off.
 
-    By default, all are off. The last four were found in the public source, not on the running
-    server.
+    The last four were found in the public source, not on the running server.
 
-    stop_port_keeps_motion: SL stops F, B and RM, but the motion stays "in progress". Later motions
-        are refused; a later SM or SRM hangs the command port.
-    spin_stop_ends_drives: SS stops F, B and RM, as SL does.
-    early_stop_is_ignored: the stop port has no effect before the reply to F, B, R, L or RM.
-    left_spin_in_reference_move: L is accepted during RM, and hangs the command port.
-    moves_wait_for_imu: F, B, TF, TB, PTF, MCF, MCB and SB wait for a working IMU.
-    drives_trust_imu: without an IMU, RM, R and L start, and uncontrolled motions continue. The
-        server then detects no obstacle, start or stop.
-    reference_speed_wraps: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
-    reference_start_counts_on: at the start of RM, the count of samples begins at its value after
-        the last stop of RM, not at 0. If RM fails, its reply has the failure text of the last F or
-        B.
-    speed_word_first: a speed word after the number is ignored.
-    zero_distance_is_unlimited: TF, TB, MCF and MCB drive without a limit if the request has 0 or a
-        word instead of a distance.
-    echoes_distance: TF and TB report the distance computed from time, not the driven distance.
-    crashes_on_missing_numbers: TIME, CS, MCS, SFR, SRR and SDR end the server if a number is
-        missing.
-    crashes_early: VOLTS and all motions except F and B end a server that has just started.
-    empty_datagram_ends: an empty datagram at the command port ends the server.
-    exit_is_silent: EXIT is answered only if LOG was sent before.
-    log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN.
-    unknown_reset_repeats: RST with an unknown word repeats the previous reply.
-    clock_moves_heading: TIME in a motion adds turn rate * clock jump to the heading.
-    undocumented_commands: without this quirk, ENC is the only undocumented command.
-    heading_in_reference_moves_only: the heading of RMRA changes in RM only.
-    probe_turns: MCR 0 runs the motors until the wheel moves. With a dead IMU, it runs them for
-        0.5 s.
-    heading_starts_off: the first sample of RM adds an error to the heading of RMRA: half the turn
-        rate, times the time since the previous RM.
-    corrects_after_stop: TF, TB, PTF, MCF and MCB may correct the heading even in the sample in
-        which they stop by themselves. This leaves one motor on, usually with one unit.
+    * ``stop_port_keeps_motion``: SL stops F, B and RM, but later motions are refused, and a later
+      SM or SRM hangs the command port.
+    * ``spin_stop_ends_drives``: SS stops F, B and RM, as SL does.
+    * ``early_stop_is_ignored``: the stop port has no effect before the reply to F, B, R, L or RM.
+    * ``left_spin_in_reference_move``: L is accepted during RM, and hangs the command port.
+    * ``moves_wait_for_imu``: F, B, TF, TB, PTF, MCF, MCB and SB wait for a working IMU.
+    * ``drives_trust_imu``: without an IMU, RM, R and L start, and uncontrolled motions continue,
+      but obstacles, starts and stops are not detected.
+    * ``reference_speed_wraps``: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
+    * ``reference_start_counts_on``: RM counts samples from the count of its last stop, not from 0.
+      A failed RM replies with the error of the last F or B.
+    * ``speed_word_first``: a speed word after the number is ignored.
+    * ``zero_distance_is_unlimited``: TF, TB, MCF and MCB with 0 or a word as distance have no
+      limit.
+    * ``echoes_distance``: TF and TB report the distance computed from time, not the driven
+      distance.
+    * ``crashes_on_missing_numbers``: TIME, CS, MCS, SFR, SRR and SDR without a number end the
+      server.
+    * ``crashes_early``: VOLTS and all motions except F and B end a server that has just started.
+    * ``empty_datagram_ends``: an empty datagram at the command port ends the server.
+    * ``exit_is_silent``: EXIT is answered only if LOG was sent before.
+    * ``log_deletes_files``: LOG deletes the files of LAST MOVE and LAST TURN.
+    * ``unknown_reset_repeats``: RST with an unknown word repeats the previous reply.
+    * ``clock_moves_heading``: TIME in a motion adds turn rate * clock jump to the heading.
+    * ``undocumented_commands``: without this quirk, ENC is the only undocumented command.
+    * ``heading_in_reference_moves_only``: the heading of RMRA changes in RM only.
+    * ``probe_turns``: MCR 0 runs the motors until the wheel moves; with a dead IMU, for 0.5 s.
+    * ``heading_starts_off``: the first sample of RM adds half the turn rate times the time since
+      the previous RM to the heading of RMRA.
+    * ``corrects_after_stop``: TF, TB, PTF, MCF and MCB may correct the heading in the sample of
+      their stop, and leave one motor on, usually with one unit.
     """
 
     stop_port_keeps_motion: bool = False
@@ -88,8 +86,8 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks that are in the public source code. They are those of ``FIRMWARE``, except where the
-source code contradicts the behaviour of the running server."""
+"""Quirks in the public source code: those of ``FIRMWARE``, except where the source code contradicts
+the running server."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {
@@ -105,33 +103,22 @@ Stuck = Literal["none", "left", "right", "both"]
 class MartSettings:
     """Settings of the controller, its robot and its surroundings.
 
-    speed_mps_per_unit: wheel speed for one register unit at ``nominal_volts``.
-
-    dead_zone_units: number of register units up to which a motor does not turn. The speed is
-        proportional to the units above this number.
-
-    motor_inequality: how much faster the left motor is, as a fraction of the speed.
-
-    encoder_sign: -1 if the encoder counts down while the robot drives forward.
-
-    gyro_bias_dps: bias of the gyro. The server knows it only after the command SB.
-
-    gyro_noise_dps: standard deviation of a gyro sample while a wheel turns.
-
-    imu_dies_s, imu_returns_s: times since construction at which the IMU fails and works again.
-
-    motor_board_silent: whether the serial line to the motor board is cut.
-
-    motor_status: status bits of the motor board, except those of the voltage; a trip or short
-    circuit stops the motor.
-
-    front_m, rear_m: distances from the start to walls across the x axis.
-
-    dock_m: distance from the start to the dock, forward.
-
-    reference_start_fails: whether the server answers ``fail`` to RM although the robot moves.
-
-    clock_s: initial wall clock in Unix time.
+    * ``speed_mps_per_unit``: wheel speed per register unit beyond the dead zone, at
+      ``nominal_volts``.
+    * ``dead_zone_units``: number of register units up to which a motor does not turn.
+    * ``motor_inequality``: how much faster the left motor is, as a fraction of the speed.
+    * ``encoder_sign``: -1 if the encoder counts down while the robot drives forward.
+    * ``gyro_bias_dps``: bias of the gyro, which the server measures before linear moves and in SB.
+    * ``gyro_noise_dps``: standard deviation of a gyro sample while a wheel turns.
+    * ``imu_dies_s``, ``imu_returns_s``: times since construction at which the IMU fails and works
+      again.
+    * ``motor_board_silent``: whether the serial line to the motor board is cut.
+    * ``motor_status``: status bits except those of the voltage. A trip or short circuit stops the
+      motor.
+    * ``front_m``, ``rear_m``: distances from the start to walls across the x axis.
+    * ``dock_m``: distance from the start to the dock, forward.
+    * ``reference_start_fails``: whether the server answers ``fail`` to RM although the robot moves.
+    * ``clock_s``: initial wall clock in Unix time.
     """
 
     quirks: Quirks = FIRMWARE

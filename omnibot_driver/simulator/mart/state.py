@@ -2,7 +2,7 @@
 
 """State of a simulated server and its robot: true values, and the values that the server assumes.
 
-This module holds and computes values; it does not know commands, or how time passes.
+This module does not know commands, or how time passes.
 """
 
 import time
@@ -41,13 +41,14 @@ class Waiter(NamedTuple):
 class ServerState:
     """The state of the server, its robot and its surroundings.
 
-    crashed: why the server ended; empty while it runs.
-    alarm: the kind of motion whose progress the server supervises now; None if it supervises none.
-    starting: the kind of motion whose command is not answered yet.
-    custom: parameters that SLMP and SSP have set.
-    sampling_since_s: time at which a motion began to use a sonar; -1 while no motion uses one.
-    front_m, rear_m, dock_m: distances from the start to the walls and to the dock. A test may
-        change them, the chassis and the IMU during a run.
+    * ``crashed``: why the server ended; empty while it runs.
+    * ``alarm``: the kind of motion that the server supervises now, or None.
+    * ``starting``: the kind of motion whose command is not answered yet, or None.
+    * ``custom``: parameters that SLMP and SSP have set.
+    * ``sampling_since_s``: time at which a motion began to use a sonar, or -1.
+    * ``front_m``, ``rear_m``, ``dock_m``: distances from the start to the walls and to the dock.
+
+    A test may change the distances, the chassis and the IMU during a run.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -122,10 +123,7 @@ class ServerState:
 
     @property
     def conflict(self) -> bool:
-        """Whether the server refuses motions.
-
-        It does so during a motion, a recording or direct control of the motors (MCS).
-        """
+        """Whether a motion, a recording or direct motor control (MCS) blocks further motions."""
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:
@@ -166,9 +164,8 @@ class ServerState:
     def sample_reference(self, *, first: bool) -> None:
         """Record the time at which the server samples the IMU in a forward drive (RM).
 
-        With the quirk ``heading_starts_off``, the first sample of a drive changes the heading. The
-        change grows with the time since the last drive. If the clock was set back since then, the
-        change is huge.
+        With the quirk ``heading_starts_off``, the first sample shifts the heading, in proportion to
+        the time since the last drive.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s

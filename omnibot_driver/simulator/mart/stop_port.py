@@ -2,7 +2,7 @@
 
 """The stop port. Its commands work while the command port is busy, and are never answered.
 
-This module knows the three commands of the stop port; it does not know those of the command port.
+This module does not know the commands of the command port.
 """
 
 from typing import TYPE_CHECKING
@@ -33,13 +33,10 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", motion: Motion) -> bool:
-    """Stop a motion that has no target: a drive (F, B, RM) or a spin (R, L).
+    """Stop a drive (F, B, RM) or a spin (R, L). Return whether the caller must wait for its end.
 
-    Return True if the caller must wait for the end of the motion.
-
-    A motion that is already stopping is not stopped again. The caller waits for the end of such a
-    drive, but not of such a spin. A drive that the module ``alarms`` no longer watches is not
-    stopped, and the caller does not wait.
+    * Already stopping: nothing changes; True for a drive, False for a spin.
+    * A drive that the module ``alarms`` no longer watches: nothing is stopped; False.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Codec of the datagrams as the server reads and writes them. Its only source is the manual.
+"""Codec of the datagrams as the server reads and writes them, from the manual only.
 
-Numbers are parsed as by C's ``atoi``. This module does not know the meaning of a command.
+Numbers are parsed as by C's ``atoi``. This module does not know commands.
 """
 
 import re

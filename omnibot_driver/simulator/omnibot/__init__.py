@@ -2,8 +2,7 @@
 
 """The simulated OmniBot board for tests of the driver, written from the manual of the real board.
 
-It shares no code with the driver, so tests can reveal a misread manual. ``python -m
-omnibot_driver.simulator`` runs it in real time.
+The package shares no code with the driver.
 """
 
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults

@@ -2,11 +2,8 @@
 
 """The board's firmware: its modes, the 100 Hz control loop, and when each frame is sent.
 
-The same settings and input always give the same output. Comments mark the assumptions about points
-that the manual does not describe.
-
-This module knows the manual's state machine and control equations. It must not know ports or real
-time.
+Equal settings and input give equal output. Comments mark assumptions. This module must not know
+ports or real time.
 """
 
 from collections import deque
@@ -130,14 +127,14 @@ class SimulatedBoard:
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
         """Hold the robot by hand: tilt it by angles in rad, and turn it left at a rate in rad/s.
 
-        Only the IMU measures the tilt and the turn. The robot's true pose does not change.
+        Only the IMU measures this motion; the true pose does not change.
         """
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
     def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:
         """Push the robot along its own axes, and turn it to the left, from now on.
 
-        The arguments are in PWM steps. They are added to the efforts of the motors.
+        The arguments are added to the efforts of the motors, in PWM steps.
         """
         self._world.force = Force(x_pwm, y_pwm, turning_pwm)
 

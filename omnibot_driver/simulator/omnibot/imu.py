@@ -1,10 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The IMU, an MPU6050 with the ranges ±2 g and ±250 °/s. By default the IMU is mounted upside down.
+"""The IMU, an MPU6050 with the ranges ±2 g and ±250 °/s, by default mounted upside down.
 
-Its distance from the body's origin is ignored.
-
-This module knows the sensor's scales, axes, bias and noise. It must not know the frame layout.
+The position of the IMU on the robot is ignored. This module must not know the frame layout.
 """
 
 from math import cos, degrees, sin, sqrt

@@ -2,10 +2,8 @@
 
 """One wheel: a motor with its encoder, and the firmware's speed controller for it.
 
-Speeds are in encoder counts per tick, efforts in PWM steps. The motor model is assumed: first
-order, with dry friction and a dead zone.
-
-This module must not know commands, geometry or the wire.
+Speeds are in encoder counts per tick, efforts in PWM steps. Assumed motor: first order, dry
+friction, dead zone. This module must not know commands, geometry or the wire.
 """
 
 from collections import deque
@@ -25,8 +23,8 @@ STICKING_SPEED = 0.3
 class MotorConstants:
     """Properties of one motor.
 
-    * ``pwm_per_count``: PWM steps for a speed of one count per tick. With the default, the manual's
-      feed-forward supplies seven eighths of the effort.
+    * ``pwm_per_count``: PWM steps for a speed of one count per tick. For the default, the manual's
+      feed-forward gives seven eighths of the effort.
     * ``time_constant_ticks``: time constant of the speed.
     * ``delay_ticks``: delay from an effort to its effect.
     """
@@ -92,7 +90,7 @@ class Motor:
     def turn(self, counts: float, pwm: float) -> None:
         """Let an outside force turn the wheel by ``counts`` in one tick.
 
-        ``pwm``: effort of the motor. It does not change the motion in this tick.
+        ``pwm``: effort of the motor, which has no effect in this tick.
         """
         self._on_the_way.append(pwm)
         self._on_the_way.popleft()
@@ -105,8 +103,7 @@ class WheelController:
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    While the PWM is at its limit, the integral term changes only if this moves the PWM away from
-    the limit.
+    At the PWM limit, the integral term changes only away from it.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

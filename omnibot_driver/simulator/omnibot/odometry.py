@@ -2,11 +2,8 @@
 
 """The firmware's odometry from its encoders (manual, Odometry equation).
 
-Each 25 Hz message contains a rounded displacement. A host that adds these displacements also adds
-their rounding errors.
-
-This module knows encoder counts, the assumed dimensions and units. It must not know modes, time, or
-the true pose.
+The displacements of the 25 Hz messages are rounded, so their sum has rounding errors. This module
+must not know modes, time, or the true pose.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import PlanarPose, body_from_rims

@@ -2,8 +2,8 @@
 
 """Positional control: driving to a commanded pose.
 
-The manual describes only the switch that selects positional control; everything else is assumed.
-This module knows the units and the speed. It must not know wheels.
+The manual describes only the switch for it; everything else is assumed. This module must not know
+wheels.
 """
 
 from math import cos, hypot, sin
@@ -18,10 +18,7 @@ SPEED_PER_WAY = 2.0
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
-"""Largest distance from the goal, in m, at which the robot no longer drives.
-
-It is also the largest angle, in rad, at which the robot no longer turns.
-"""
+"""Largest deviation from the goal, in m or rad, at which the robot no longer drives or turns."""
 
 
 def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
@@ -35,7 +32,7 @@ def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
 def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
     """Return the twist straight to the goal: body x and y in m/s, and the yaw rate in rad/s.
 
-    Headings are unwrapped: if the goal's yaw is larger by 2π, the robot makes a full turn.
+    Headings are unwrapped: a difference of 2π is a full turn.
     """
     dx_m, dy_m = goal.x_m - pose.x_m, goal.y_m - pose.y_m
     way_m, turn_rad = hypot(dx_m, dy_m), goal.yaw_rad - pose.yaw_rad

@@ -2,10 +2,8 @@
 
 """The firmware's receiver: takes bytes, and returns the commands that they complete.
 
-The manual does not specify how the firmware finds commands. So this module has several receivers. A
-driver must be safe with each of them.
-
-This module knows control frames, letters and the time of a byte. It must not know modes or motion.
+The manual does not say how commands are found, so there are several receivers. A driver must be
+safe with each. This module must not know modes or motion.
 """
 
 from collections.abc import Callable
@@ -41,9 +39,9 @@ _NOTHING: Final[Step] = (b"", None, False)
 
 
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames: a frame is FF FE and the seven bytes after it. There is no timeout.
+    """Find frames: FF FE and the seven bytes after it, without a timeout.
 
-    In the bytes FF FF FE, the last two are recognised as the header of a frame.
+    In the bytes FF FF FE, the last two are a header.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
@@ -53,10 +51,9 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does, with one difference in the handling of FF.
+    """Find frames as ``counting`` does, but discard FF and a next byte other than FE.
 
-    If the byte after FF is not FE, both bytes are discarded. As a result, the header in the bytes
-    FF FF FE is missed.
+    The header in the bytes FF FF FE is therefore missed.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
@@ -64,18 +61,14 @@ def naive(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does, but discard an incomplete frame after 5 ms without a byte.
-
-    This time is ``IDLE_GAP_S``.
-    """
+    """Find frames as ``counting`` does, but discard an incomplete frame after ``IDLE_GAP_S``."""
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 
 
 def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
-    The receiver keeps the bytes of an accepted frame. The next frame may begin with some of them,
-    so frames can overlap.
+    The bytes of an accepted frame are kept, so frames can overlap.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -95,12 +88,11 @@ FRAMINGS: Final[dict[FramingName, Framing]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReceiverKind:
-    """Selects the behaviour of the receiver.
+    """The behaviour of the receiver.
 
     * ``framing``: how the receiver finds control frames.
-    * ``letters``: where the receiver obeys state letters: only between control frames, or anywhere.
-    * ``wakes_while_booting``: whether the receiver wakes from bytes that arrive during the boot. If
-      not, it ignores these bytes.
+    * ``letters``: where state letters are obeyed: between control frames, or anywhere.
+    * ``wakes_while_booting``: whether bytes that arrive during the boot wake the receiver.
     """
 
     framing: FramingName = "counting"
@@ -115,9 +107,8 @@ class CommandReceiver:
     """The receiver from one power-up to the next.
 
     * ``held``: received bytes that may be the beginning of a frame.
-    * ``last_at_s``: arrival time of the last byte that could belong to a control frame.
-    * ``to_swallow``: number of bytes that are still needed to wake the receiver. These bytes are
-      lost.
+    * ``last_at_s``: arrival time of the last byte while control frames were accepted.
+    * ``to_swallow``: number of bytes that are lost before the receiver is awake.
     """
 
     def __init__(self, kind: ReceiverKind = COUNTING, *, awake: bool = False) -> None:
@@ -129,10 +120,7 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """Process a byte that arrives during the boot.
-
-        If the receiver can wake during the boot, the byte is a wake-up byte. Otherwise it is lost.
-        """
+        """Process a byte that arrives during the boot: it is lost, or counts as a wake-up byte."""
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 

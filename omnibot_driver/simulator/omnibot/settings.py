@@ -27,23 +27,21 @@ class BoardPose:
 class BoardSettings:
     """Properties of a simulated board, and deviations of its robot from the ideal.
 
-    * ``frame``: content of the 25 Hz message. "earth": difference of positions in the board's earth
-      frame. "body": sum of the ticks' displacements. "wheel_counts": encoder counts, as in the
-      manual's section Deprecated.
-    * ``delta_period_s``: period of the 25 Hz message, a multiple of 10 ms. The default is 0.04 s.
-      The manual also states 0.1 s.
-    * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: LSB per rad/s.
-    * ``control``: position of the on-board switch, which decides whether commands are velocities,
-      or poses in the earth frame.
-    * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad of an unwrapped heading.
-    * ``estop_latches``: True if an emergency stop lasts until a reset. False if an emergency stop
-      lasts until the next motion command.
+    * ``frame``: content of the 25 Hz message: "earth" (difference of positions in the board's earth
+      frame), "body" (sum of the ticks' displacements) or "wheel_counts" (manual, Deprecated).
+    * ``delta_period_s``: period of the 25 Hz message, a multiple of 10 ms. The manual also states
+      0.1 s.
+    * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds.
+    * ``angular_scale``: LSB per rad/s.
+    * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
+    * ``position_scale``: LSB per m.
+    * ``heading_scale``: LSB per rad of an unwrapped heading.
+    * ``estop_latches``: whether an emergency stop lasts until a reset, or until the next motion
+      command.
     * ``axis_signs``: signs of the board's x, y and yaw relative to REP-103.
-    * ``motor_wiring``: for each controller, the number of the motor that is connected to it, 1 to
-      3. A negative number means that the poles of this motor are swapped. Its encoder is not
-      swapped.
-    * ``wheel_radius_m``, ``base_radius_m``, ``counts_per_revolution``: values that the firmware
-      assumes.
+    * ``motor_wiring``: for each controller, the number of its motor, 1 to 3; negative if the
+      motor's poles, but not its encoder, are swapped.
+    * ``wheel_radius_m``, ``base_radius_m``, ``counts_per_revolution``: assumed by the firmware.
     * ``wheel_radius_scale``, ``base_radius_scale``: true value divided by the assumed one.
     * ``slip``: mean fraction of the rim motion that is lost. The slip of each wheel varies.
     * ``slope_pwm``: pull of a slope along the initial x axis, in PWM steps.

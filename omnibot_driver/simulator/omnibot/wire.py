@@ -2,8 +2,8 @@
 
 """The serial protocol from the board's side: layouts of the frames it sends and receives.
 
-Its only source is the manual's Serial Command and Serial Data Output. It shares no code with the
-driver's codec. This module knows byte layouts. It must not know modes or motion.
+Source: the manual's Serial Command and Serial Data Output. The module shares no code with the
+driver.
 """
 
 import struct
@@ -62,8 +62,7 @@ def imu_frame(accel: Triple, gyro: Triple) -> bytes:
 def delta_frame(difference: Triple, seq: int) -> bytes:
     """Encode the 9 bytes of the delta frame, which is sent at 25 Hz.
 
-    ``difference``: three int16 numbers. They are either a displacement in 0.1 mm and 0.1 mrad, or
-    the counts of the three wheels.
+    ``difference``: displacement in 0.1 mm and 0.1 mrad, or counts of the three wheels, as int16.
     """
     return _DELTA.pack(0xFF, 0xFB, *difference, seq)
 

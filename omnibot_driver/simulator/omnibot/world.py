@@ -2,8 +2,7 @@
 
 """The robot on the ground: how it truly moves when the motors turn.
 
-This module knows motors, true wheel sizes, slip and the true pose. It must not know what the
-firmware assumes, commands or sends.
+This module must not know the firmware.
 """
 
 from collections.abc import Sequence
@@ -53,8 +52,7 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Force and torque are converted to one effort for each wheel, as a velocity is converted to wheel
-    speeds. This effort is added to that of the wheel's motor.
+    The force is distributed to the wheels like a velocity, and added to the motors' efforts.
     """
 
     x_pwm: float = 0.0
@@ -178,8 +176,7 @@ class World:
     def _wander(self, slip: float, rim_m: float) -> float:
         """Return the wheel's slip, from 0 to 1, after its rim has moved by ``rim_m``.
 
-        ``slip``: the slip before this motion. The slip varies at random about the mean slip, with a
-        standard deviation of half the mean slip.
+        ``slip``: the slip before. The standard deviation of the slip is half its mean.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)
