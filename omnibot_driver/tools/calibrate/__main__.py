@@ -21,13 +21,12 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Run the subcommand that the command line names; return the exit code.
+    """Run the subcommand that the command line names.
 
-    Exit codes: 0 success, 1 failure, 2 wrong usage, 130 interrupted.
+    * ``argv``: the arguments after the program's name; default: those of this process.
+    * ``read``: asks the user a question and returns the answer.
 
-    ``argv``: the arguments after the program's name; by default, those of this process.
-
-    ``read``: asks the user a question and returns the answer.
+    Returns the exit code: 0 success, 1 failure, 2 wrong usage, 130 interrupted.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)

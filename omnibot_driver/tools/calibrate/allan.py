@@ -2,8 +2,8 @@
 
 """The Allan deviation of a sensor at rest, and the noise terms that fit it.
 
-Sources: NIST Special Publication 1065 and IEEE Std 952-1997, annex C. This module knows readings
-and their period; it does not know the sensor.
+Sources: NIST Special Publication 1065 and IEEE Std 952-1997, annex C. This module does not know the
+sensor.
 """
 
 from dataclasses import dataclass
@@ -15,28 +15,22 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Smallest number of averages from which an Allan deviation is computed. With a longer averaging
-time, a recording contains fewer averages. So the longest averaging time is one ninth of the
-recording."""
+"""Smallest number of averages from which an Allan deviation is computed. So the longest averaging
+time is one ninth of the recording."""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 58.0
-"""Shortest recording, in s, from which the tool estimates bias instability and random walk.
-
-It is a little less than a minute, because a recording of a minute may lack some readings.
-"""
+"""Shortest recording, in s, from which bias instability and random walk are estimated: a minute in
+which some readings are missing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Allan:
     """Allan deviations of a sensor. All arrays have the shape (n,).
 
-    ``recorded_s``: duration of the recording, in s.
-
-    ``tau_s``: averaging times, in s.
-
-    ``deviation``: the Allan deviation for each averaging time, in the unit of the readings.
-
-    ``sigma``: standard deviation of each value in ``deviation``.
+    * ``recorded_s``: duration of the recording, in s.
+    * ``tau_s``: averaging times, in s.
+    * ``deviation``: deviation for each averaging time, in the unit of the readings.
+    * ``sigma``: standard deviation of each deviation.
     """
 
     recorded_s: float
@@ -49,13 +43,10 @@ class Allan:
 class Noise:
     """Noise terms of a sensor whose readings have the unit U.
 
-    ``density``: white noise, in U/√Hz.
-
-    ``sigma``: standard deviation of ``density``.
-
-    ``instability``: bias instability (flicker noise), in U.
-
-    ``walk``: random walk of the bias, in U/√s.
+    * ``density``: white noise, in U/√Hz.
+    * ``sigma``: standard deviation of ``density``.
+    * ``instability``: bias instability (flicker noise), in U.
+    * ``walk``: random walk of the bias, in U/√s.
     """
 
     density: float
@@ -73,10 +64,9 @@ class Noise:
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Return the Allan deviations of ``readings``, which are ``period_s`` seconds apart.
+    """Return the Allan deviations of ``readings``, (n,), which are ``period_s`` seconds apart.
 
-    ``readings`` has the shape (n,). The averaging times grow by a quarter of an octave from one to
-    the next.
+    The averaging times grow by a quarter of an octave.
     """
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS

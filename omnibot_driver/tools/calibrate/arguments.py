@@ -19,8 +19,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter by which ``calibrate`` recognises a board that records encoder ticks and
-accepts gains. Only such a board has it."""
+"""Name of a parameter that only a board with records of encoder ticks and settable gains has."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -34,11 +33,8 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand: names of driver parameters, and a text for the error message.
-
-The subcommand works if the driver has at least one of these parameters. Otherwise, the error
-message says that the board does not have what the text names, such as "an IMU".
-"""
+"""For each subcommand: driver parameters of which the board must have at least one, and the name of
+this requirement for the error message."""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:

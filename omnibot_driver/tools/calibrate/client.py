@@ -25,16 +25,11 @@ from omnibot_driver.tools.needs import ToolError
 FOUND_WITHIN_S: Final = 5.0
 ANSWER_WITHIN_S: Final = 12.0
 REQUESTS: Final = 3
-"""Number of times that the tool sends a request that may be repeated.
-
-The middleware drops the answer if the driver has not discovered the new client within 0.1 s.
-"""
+"""Number of times that the tool sends a request that may be repeated. The middleware drops an
+answer if the driver discovers the new client too late."""
 SPIN_S: Final = 0.005
-"""Time, in s, for which one call of the executor waits for a message; the same for all calls.
-
-With different timeouts on a busy computer, rclpy's executor would handle only the IMU's messages,
-and not those of the e-stop.
-"""
+"""Time, in s, for which each call of the executor waits. With different times on a busy computer,
+rclpy does not handle the messages of the e-stop."""
 
 
 class Client:
@@ -144,11 +139,10 @@ class Client:
             self.set_parameters(changeable)
 
     def call(self, service: str, on: bool | None = None) -> str:
-        """Call a service of the driver; return the message in its response.
+        """Call a service of the driver, and return the message in its response.
 
-        ``on``: the value for a service of type SetBool; ``None`` for a service of type Trigger.
-
-        Raises ToolError if the driver reports a failure.
+        ``on``: the value for SetBool; None for a Trigger. Raises ToolError if the driver reports a
+        failure.
         """
         kind = Trigger if on is None else SetBool
         request = Trigger.Request() if on is None else SetBool.Request(data=on)

@@ -2,9 +2,8 @@
 
 """``calibrate commission``: guide the user to find how motors and IMU are oriented.
 
-The tool turns the wheels; the user tilts and turns the robot by hand. The user also answers the
-questions that the board's data cannot answer. If an answer is contradictory, the tool explains the
-contradiction and repeats the question.
+The tool turns the wheels; the user moves the robot by hand, and answers questions. Questions with
+contradictory answers are repeated.
 """
 
 import argparse
@@ -226,10 +225,10 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Run a motion, and ask in which direction each wheel turned; return the answer.
+        """Run a motion, and return in which direction the user saw each wheel turn.
 
-        The answer has 1, -1 or 0 for wheels A, B and C: counter-clockwise, clockwise, still. The
-        user can first request the motion again.
+        The numbers 1, -1 and 0 mean counter-clockwise, clockwise and still. The user can see the
+        motion again.
         """
         while True:
             self._console.say(f"\n{what}:")
@@ -310,7 +309,6 @@ class Walk:
 def _understand(answer: str) -> tuple[int, ...] | None:
     """Convert the user's answer, such as ``+0-``, to a direction (1, -1 or 0) for each wheel.
 
-    Return an empty tuple if the user typed ``r`` to see the motion again, and None if the answer is
-    not valid.
+    The result is empty for ``r`` (show the motion again), and None if the answer is not valid.
     """
     return () if answer == "r" else understand(answer)

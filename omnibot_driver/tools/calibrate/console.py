@@ -25,9 +25,8 @@ PLAIN_WIDTH: Final = 100
 class Console:
     """The dialogue with the user on a terminal.
 
-    ``yes``: answer every yes-or-no question with yes. The user still enters numbers.
-
-    ``read``: asks a question and returns the answer. Tests replace it.
+    * ``yes``: answer every yes-or-no question with yes.
+    * ``read``: asks a question and returns the answer.
     """
 
     def __init__(
@@ -91,8 +90,7 @@ class Console:
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
         """Show the progress of the task ``what`` until the end of the ``with`` block.
 
-        The ``with`` statement yields a function. The caller calls it with the completed fraction of
-        the task, 0 to 1.
+        Yields a function that the caller calls with the completed fraction of the task, 0 to 1.
         """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")
@@ -131,8 +129,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    If the uncertainty is known, it has two significant digits, and the two values have the same
-    number of decimals. If the uncertainty is 10 or more, all three are whole numbers.
+    A known uncertainty below 10 has two significant digits, and the values have as many decimals.
+    From 10 on, all three are whole numbers.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

@@ -21,9 +21,8 @@ PICTURES = (".png", ".svg", ".pdf")
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
     """Return the path of the result file: ``given``, else ``drivers``, else a default name.
 
-    ``given``: the user's choice, or None. ``drivers``: the driver's calibration file, or "".
-
-    Raises ToolError if the file is not suitable.
+    ``given``: the user's choice. ``drivers``: the driver's calibration file. Raises ToolError if
+    the file is not suitable.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)
@@ -43,9 +42,8 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 def picture_file(given: str | None, subcommand: str) -> Path:
     """Return the path of the picture, by default ``calibrate_<subcommand>.png``.
 
-    ``given``: the user's choice, which is a file, a folder, or None.
-
-    Raises ToolError if the file cannot be written, or if its suffix is not that of a picture.
+    ``given``: a file, a folder, or None. Raises ToolError if the file cannot be written, or if its
+    suffix is not that of a picture.
     """
     path = Path(given or ".").expanduser()
     if path.is_dir():

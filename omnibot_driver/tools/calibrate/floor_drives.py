@@ -38,11 +38,10 @@ def measured(
 ) -> list[Measured]:
     """Run each drive and let the user measure it; return the measurements.
 
-    ``go``: function that makes a drive, and returns its odometry poses.
+    * ``go``: makes a drive, and returns its odometry poses.
+    * ``measure``: asks the user for the end of the drive.
 
-    ``measure``: function that asks the user for the end of the drive, and returns the measurement.
-
-    Raises ToolError if a drive fails, or if the user answers that there is not enough space.
+    Raises ToolError if a drive fails, or if there is not enough space.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
@@ -84,9 +83,7 @@ def driven(
 ) -> Column:
     """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``: expected size of the whole turn. ``seconds``: expected duration of the drive.
-
-    Raises ToolError if the drive fails.
+    ``turn_rad``, ``seconds``: expected turn and duration. Raises ToolError if the drive fails.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(
@@ -105,9 +102,9 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask for the angle from the mark on the floor to the robot's front; return this angle in rad.
+    """Ask for the angle from the floor mark to the robot's front, and return it in rad.
 
-    It is positive if the front points left of the mark.
+    The angle is positive if the front points left of the mark.
     """
     return math.radians(
         console.number(

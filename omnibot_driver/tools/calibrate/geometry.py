@@ -188,9 +188,8 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first error is with the driver's current geometry, the second with the geometry ``found``.
-    The driver has no parameters for single wheels, so the second error is computed with the mean
-    radius of ``found`` for all three wheels.
+    The first is with the driver's current geometry, the second with ``found`` and its mean wheel
+    radius.
     """
     before: list[float] = []
     after: list[float] = []

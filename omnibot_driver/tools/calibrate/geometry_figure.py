@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw each drive's path with the old and with the new geometry, and the end measured by tape.
+    """Draw each drive's path with the old and the new geometry, and the end measured by tape.
 
-    Also draw the error of each path's end, in standard deviations of the tape measurement.
+    Also draw the errors of the ends, in standard deviations of the tape measurement.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

@@ -2,8 +2,8 @@
 
 """Fit the robot's geometry to drives whose ends the user measured with a tape.
 
-Method: J. Borenstein and L. Feng, "UMBmark" (1995), extended to three wheels. This module knows the
-paths by odometry and the user's measurements; it does not know how the robot was driven.
+Method: J. Borenstein and L. Feng, "UMBmark" (1995), for three wheels. This module does not know how
+the robot was driven.
 """
 
 import math
@@ -22,23 +22,17 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Assumed relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
-"""Largest accepted relative difference between a fitted radius and the assumed radius.
-
-If the difference is larger, the user's measurements are regarded as wrong.
-"""
+"""Largest accepted relative difference between a fitted and an assumed radius. Beyond it, the
+user's measurements are regarded as wrong."""
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One drive with the user's measurement.
+    """One drive with the user's measurement. Poses are x and y in m, and the unwrapped yaw in rad.
 
-    Each pose has x and y in m, and the yaw in rad without wrapping.
-
-    ``path``: odometry poses, (n, 3), until the robot is at rest.
-
-    ``end``: the measured end relative to the start, (3,). A value that was not measured is NaN.
-
-    ``sigma``: standard deviations of the values in ``end``, (3,).
+    * ``path``: odometry poses, (n, 3), until the robot is at rest.
+    * ``end``: the measured end relative to the start, (3,); NaN if not measured.
+    * ``sigma``: standard deviations of ``end``, (3,).
     """
 
     name: str
@@ -51,13 +45,11 @@ class Reading:
 class Geometry:
     """The robot's sizes, as ratios to the assumed sizes.
 
-    ``wheels``: ratio of the mean radius of the wheels. ``base``: ratio of the base radius.
-
-    ``unlike``: relative deviation of each wheel's radius from the mean, (3,).
-
-    ``covariance``: covariance of ``wheels``, ``base``, ``unlike[:2]``, (4, 4).
-
-    ``excess``: residuals divided by the expected residuals, at least 1.
+    * ``wheels``: mean radius of the wheels.
+    * ``base``: base radius.
+    * ``unlike``: relative deviation of each wheel's radius from the mean, (3,).
+    * ``covariance``: covariance of ``wheels``, ``base``, ``unlike[:2]``, (4, 4).
+    * ``excess``: residuals divided by the expected residuals, at least 1.
     """
 
     wheels: float
@@ -89,8 +81,7 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
     ``drift``: standard deviation, in m, that slip causes in a wheel's distance of 1 m.
 
-    Raises ToolError if the fit fails, or if the mean wheel radius or the base radius differs from
-    the assumed radius by more than 20 % (``UNKNOWN``).
+    Raises ToolError if the fit fails, or if a radius is more than 20 % (``UNKNOWN``) off.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -120,16 +111,11 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the path that the same wheel angles give with other radii, as poses, (n, 3).
+    """Return the path that the same wheel angles give with other radii, from the origin, (n, 3).
 
-    The result begins at the origin.
-
-    ``path``: poses that were computed with the assumed radii.
-
-    ``factors``: new radius / assumed radius of each wheel. The array has one row for all steps,
-    (3,), or one row for each step, (n - 1, 3).
-
-    ``base``: new base radius / assumed base radius.
+    * ``path``: poses that were computed with the assumed radii.
+    * ``factors``: new / assumed radius of each wheel: for all steps, (3,), or for each, (n - 1, 3).
+    * ``base``: new / assumed base radius.
     """
     return _rolled(rims_of(path, base_radius_m), factors, base * base_radius_m)
 
@@ -137,7 +123,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 def _rolled(rims: Column, factors: Column, base_radius_m: float) -> Column:
     """Return the poses of a path from the origin, (n, 3): the origin, then one pose for each step.
 
-    ``rims``: distance that each wheel rolls in each step with the assumed radii, in m, (n - 1, 3).
+    ``rims``: distances of the wheels in the steps with the assumed radii, in m, (n - 1, 3).
     """
     body = rims * factors @ np.linalg.inv(_rims(base_radius_m)).T
     yaw = np.concatenate(([0.0], np.cumsum(body[:, 2])))

@@ -2,8 +2,8 @@
 
 """The reaction to Ctrl-C, to a lost SSH session and to kill.
 
-A signal only sets a flag, and the next call of ``Interruption.check`` raises Interrupted. Only a
-question to the user is interrupted at once.
+A signal interrupts a question to the user at once. Otherwise, the next call of
+``Interruption.check`` raises Interrupted.
 """
 
 import signal

@@ -30,11 +30,8 @@ IMU, ODOMETRY = TOPICS = "imu/data_raw", "odom"
 LOST_S: Final = 0.3
 """Time without data, in s, after which the tool stops a motion."""
 CLOCKS_S: Final = 0.1
-"""Largest accepted difference between the driver's clock and this computer's clock, in s.
-
-The tool takes the times of its commands from this computer's clock, and compares them with the
-odometry's timestamps from the driver's clock.
-"""
+"""Largest accepted difference between the driver's clock and this computer's clock, in s. Commands
+have times of this computer, odometry has times of the driver."""
 AT_ONCE: Final = 100
 """Largest number of pending messages that are read at once."""
 LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -165,11 +162,7 @@ class Listener(Client):
             )
 
     def _lost(self) -> list[str]:
-        """Return the required topics without recent data.
-
-        If a topic seems silent, this program may have been too slow to read its messages. So the
-        function then reads the pending messages, and checks the topics again.
-        """
+        """Return the required topics without recent data, after reading the pending messages."""
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
             self._hear_pending()

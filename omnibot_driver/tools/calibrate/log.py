@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A log of the robot's data and commands in one motion.
+"""A log of the robot's data and commands in one motion, or of data without commands.
 
-A log can also be a recording of data without commands.
-
-All times are in s, by ROS's clock: the sampling times of data, and the sending times of commands.
-This module knows rows and columns of numbers; it does not know ROS.
+Sampling times of data and sending times of commands are in s, by ROS's clock. This module does not
+know ROS.
 """
 
 from collections.abc import Sequence

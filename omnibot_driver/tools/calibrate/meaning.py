@@ -2,8 +2,7 @@
 
 """Find how the board interprets commands, and in which frame it reports odometry deltas.
 
-The signs and scales of the odometry may still be wrong. This module knows odometry; it does not
-know how the robot is moved.
+Signs and scales of the odometry may be wrong. This module does not know how the robot is moved.
 """
 
 import math
@@ -21,15 +20,12 @@ STANDS_PART: Final = 0.1
 """Largest fraction of the commanded speed at which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""Largest ratio of late to early speed at which the robot is regarded as stopping.
-
-The early and the late speed are those of the first and the second half of a drive.
-"""
+"""Largest ratio of the speeds in the second and the first half of a drive at which the robot is
+regarded as stopping."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Limits for the speed of a second drive with twice the command, divided by that of the first.
+"""Limits for the speed of a drive with twice the command, divided by the speed of the first drive.
 
-``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: largest value for which
-the speed is regarded as unchanged. The limits allow for friction and rounding.
+``DOUBLED``: range of a doubled speed. ``UNCHANGED``: largest ratio of an unchanged speed.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
@@ -89,12 +85,9 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod | None:
-    """Return how the board interprets commands: as velocities or as positions.
+    """Return how the board interprets commands: as velocities or as positions. None if unclear.
 
     ``slow``, ``fast``: motions with the command ``slow_mps`` and with twice this command.
-
-    Return ``None`` if the motions fit neither method, for example because a busy computer has
-    delayed commands.
     """
     # In velocity control the speed is constant, and doubles with the command. In positional control
     # the command is a position a few mm from the origin of the board's frame. The robot has stopped
@@ -123,10 +116,8 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     """Return whether the driver uses the right frame of the odometry deltas ("earth" or "body").
 
-    ``before``, ``after``: two drives by the same command. Between them, the robot turned by
-    ``turned_rad``.
-
-    Raises ToolError if the drives fit neither frame.
+    ``before``, ``after``: equal drives before and after a turn by ``turned_rad``. Raises ToolError
+    if they fit neither frame.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

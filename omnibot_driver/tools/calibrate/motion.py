@@ -21,27 +21,23 @@ HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 Law = Callable[[float, Pose], Vector3 | None]
 """A control law: a function that returns the command, or None to end the motion.
 
-Its arguments are the time in s since the start of the motion, and the pose relative to the start.
-The yaw of this pose is not wrapped. The command of ``cmd_vel`` is in m/s, m/s and rad/s. The
-command of ``wheel_cmd`` is in rad/s.
+Arguments: time in s since the start, and pose relative to the start, with unwrapped yaw. Commands
+of ``cmd_vel`` are in m/s, m/s and rad/s, those of ``wheel_cmd`` in rad/s.
 """
 
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Time, in s, that replaces ``LOOK_S`` if the board rarely measures its motion.
-
-Between two measurements of such a board, the driver only predicts the odometry. So the tool must
-compare for a longer time.
-"""
+"""Time, in s, that replaces ``LOOK_S`` for a board that rarely measures its motion. Between two
+measurements, the odometry is only predicted."""
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Commanded speeds. If a command is slower, the tool does not check that the robot moves.
+"""Smallest commands for which the tool checks that the robot moves. Friction may prevent slower
+motions.
 
-Friction may prevent such slow motions. For ``cmd_vel``, the values are a linear speed in m/s and a
-yaw rate in rad/s. For ``wheel_cmd``, they are in rad/s.
+For ``cmd_vel``: linear speed in m/s and yaw rate in rad/s. For ``wheel_cmd``: rad/s.
 """
 
 
@@ -49,15 +45,12 @@ yaw rate in rad/s. For ``wheel_cmd``, they are in rad/s.
 class Bounds:
     """Limits of one motion, for the topic ``cmd_vel`` or ``wheel_cmd``.
 
-    ``speed``, ``turning``: largest commands, in m/s and rad/s. For ``wheel_cmd``, ``speed`` is the
-    largest wheel rate, in rad/s, and ``turning`` has no effect.
-
-    ``way``, ``turn``: largest distance and turn from the start, by the odometry, in m and rad.
-
-    ``seconds``: longest duration of the motion.
-
-    ``acceleration``, ``angular_acceleration``: limits in m/s² and rad/s². Infinite: no ramp. For
-    ``wheel_cmd``, ``acceleration`` is in rad/s².
+    * ``speed``, ``turning``: largest commands, in m/s and rad/s. For ``wheel_cmd``, ``speed`` is a
+      wheel rate in rad/s, and ``turning`` has no effect.
+    * ``way``, ``turn``: largest distance and turn from the start, by the odometry, in m and rad.
+    * ``seconds``: longest duration.
+    * ``acceleration``, ``angular_acceleration``: in m/s² and rad/s²; infinity: no ramp. For
+      ``wheel_cmd``, ``acceleration`` is in rad/s².
     """
 
     speed: float
@@ -129,14 +122,12 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Add the motion since the last call to the sums of commanded and measured motion.
+        """Add the motion since the last call, and check at intervals that the robot moves.
 
-        The sums are compared after 1 s, or after 3 s if the board rarely measures its motion.
-        Raises ToolError if the measured motion is then less than a fifth of the commanded motion.
-        Commands slower than ``PLAIN`` are not checked.
+        ``seconds``: time since the last call. ``measured``: velocity, in the units of ``command``.
 
-        ``seconds``: time since the last call. ``measured``: measured velocity, in the units of
-        ``command``.
+        Raises ToolError if the motion is less than a fifth of the commanded motion. Commands slower
+        than ``PLAIN`` are not checked.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

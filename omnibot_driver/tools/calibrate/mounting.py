@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the mounting of the IMU from gravity in three postures of the robot.
+"""Find the mounting of the IMU from gravity in three postures: level, front up, left side up.
 
-The postures are level, front raised, and left side raised. A turn to the left shows whether gyro
-and gravity agree. This module knows IMU readings; it does not know how the user is asked.
+A turn to the left shows whether gyro and gravity agree. This module does not know the questions.
 """
 
 import math
@@ -29,29 +28,22 @@ SQUARE_RAD: Final = math.radians(35)
 """Largest accepted deviation of the angle between the two tilts from 90°, in rad."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest rotation, in rad, by which the tool corrects a mounting to a right-angled one.
-
-In a right-angled mounting, each axis of the IMU is parallel to an axis of the body.
-"""
+"""Largest rotation, in rad, by which a mounting is corrected to one whose axes are parallel to
+those of the body."""
 HAND_RAD: Final = math.radians(2)
 """Smallest assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
-"""Weight of the level posture in the fit.
-
-A posture that is tilted by hand is less exact, and has the weight 1.
-"""
+"""Weight of the level posture in the fit. A posture that is tilted by hand is less exact, and has
+the weight 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
     """The mounting of the IMU on the robot.
 
-    ``rotation``: converts from the sensor's axes to the body's axes.
-
-    ``yaw_sigma_rad``: standard deviation of the yaw. It is not 0, because the user tilts the robot
-    inexactly.
-
-    ``tilts_rad``: angles of the tilts with the front raised and with the left side raised.
+    * ``rotation``: converts from the sensor's axes to the body's axes.
+    * ``yaw_sigma_rad``: standard deviation of the yaw, due to inexact tilts.
+    * ``tilts_rad``: angles of the tilts with the front and with the left side raised.
     """
 
     rotation: Array
@@ -103,11 +95,8 @@ def bias(imu: Imu) -> Array:
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     """Return the mounting from the upward direction in three postures.
 
-    The arguments are unit vectors in the sensor's axes: robot level, front raised, left side
-    raised.
-
-    Raises Contradiction if a tilt is too small or too large, or if the angle between the tilts is
-    not about 90°.
+    The arguments are unit vectors in the sensor's axes. Raises Contradiction if a tilt is too small
+    or too large, or if the tilts are not about 90° apart.
     """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)
@@ -136,9 +125,8 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
 def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
     """Return the angle, in rad, by which the user has turned the robot to the left.
 
-    ``bias_radps``: the gyro's bias. ``level``: the upward direction in the sensor's axes.
-
-    Raises Contradiction if the turn is too small, or to the right.
+    ``level``: the upward direction in the sensor's axes. Raises Contradiction if the turn is too
+    small, or to the right.
     """
     rate = (imu.rate_radps - bias_radps) @ level
     turn_rad = float(np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(imu.stamp_s)))

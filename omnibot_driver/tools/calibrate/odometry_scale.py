@@ -2,9 +2,10 @@
 
 """``calibrate geometry`` and ``calibrate scale`` for a base that only drives straight and turns.
 
-If the driver has the parameter ``metres_per_count``, the tool finds ``metres_per_count``,
-``linear_scale`` and ``motor_balance``. Otherwise, the tool finds the scales of the odometry. This
-module knows drives and their measurements; it does not know the base's wheels.
+* With the parameter ``metres_per_count``: finds it, ``linear_scale`` and ``motor_balance``.
+* Otherwise: finds the scales of the odometry.
+
+This module does not know the base's wheels.
 """
 
 import argparse
@@ -27,25 +28,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives.
-
-If the user measures one of two drives wrongly, the tool notices it, because the results of the
-drives differ.
-"""
+"""Number of straight drives. A wrong measurement of one drive shows, because the results differ."""
 UNLIKE: Final = 4.0
 """Number of standard deviations. If two ratios differ by more than this number, the tool warns."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Names of two parameters: m per encoder count, and number of motor units per m/s.
-
-The tool finds ``COUNT``. If the new value of ``COUNT`` is larger than the old one by a factor, the
-tool divides ``UNITS`` by this factor.
-"""
+"""Names of two parameters: m per encoder count, and number of motor units per m/s. The tool
+multiplies ``COUNT`` by a factor, and divides ``UNITS`` by the same factor."""
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
-"""Name, name in /diagnostics, and standard deviation of the parameter for the motors' balance.
-
-The driver measures the balance of the two motors during the drives.
-"""
+"""Name, name in /diagnostics, and standard deviation of the balance of the two motors, which the
+driver measures."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark where"
     " the robot's centre is and where the front points. After a straight drive, enter how far the"
@@ -70,9 +62,8 @@ class Drive:
 class Ratio:
     """The motion in one drive, in m or rad, measured by the user and by the odometry.
 
-    ``told``: motion that the odometry measured.
-
-    ``true``, ``sigma``: motion that the user measured on the floor, and its standard deviation.
+    * ``told``: motion by the odometry.
+    * ``true``, ``sigma``: motion by the user, and its standard deviation.
     """
 
     drive: Drive

@@ -2,8 +2,7 @@
 
 """The simulation of a wheel with a band-limited PI controller, after a step of the set-point.
 
-This module knows the plant, the controller and the encoder; it does not know how plant and gains
-were found.
+This module does not know how plant and gains were found.
 """
 
 from dataclasses import dataclass
@@ -21,19 +20,17 @@ NOMINAL_S: Final = 0.2
 """Control period of the manual, in s. The board computes its coefficients for this period."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
-"""Time, in s, that the public firmware needs to send its tick counts and its odometry.
-
-Together, these messages are nine lines of 14 characters.
-"""
+"""Time, in s, in which the public firmware sends tick counts and odometry: nine lines of 14
+characters."""
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
 
 
 @dataclass(frozen=True, slots=True)
 class PiGains:
-    """The gains Kp, Tn and Td that are written to the board.
+    """The gains Kp, Tn and Td that are written to the board. Tn and Td are in s.
 
-    They are numbers, or arrays of the same shape with many candidates. Tn and Td are in s.
+    The gains are numbers, or arrays of the same shape with many candidates.
     """
 
     kp: Array | float
@@ -45,17 +42,12 @@ class PiGains:
 class Loop:
     """The control loop of a wheel. Times are in s.
 
-    ``dead_s``: dead time of the plant.
-
-    ``whole_rpm``: whether the controller rounds the measured speed down to whole RPM.
-
-    ``nominal_s``: the control period that the board assumes.
-
-    ``feed_forward``: duty in percent for each RPM of the set-point.
-
-    ``low_pass``: coefficient of the low-pass filter of the set-point. 1: no filter.
-
-    ``sends_each_s``: period with which the board sends its tick counts.
+    * ``dead_s``: dead time of the plant.
+    * ``whole_rpm``: whether the measured speed is rounded down to whole RPM.
+    * ``nominal_s``: the control period that the board assumes.
+    * ``feed_forward``: duty in percent for each RPM of the set-point.
+    * ``low_pass``: coefficient of the set-point's low-pass filter; 1: no filter.
+    * ``sends_each_s``: period with which the board sends its tick counts.
     """
 
     period_s: float
@@ -89,15 +81,13 @@ def answer(
 ) -> Array:
     """Return the speed of a wheel, in RPM, after a step of the set-point from standstill.
 
-    The first dimension is time, in steps of 1 ms. The other dimensions are the common shape to
-    which the gains, ``dead_s``, ``begun`` and ``sent_s`` are broadcast.
+    The first dimension is time, in steps of 1 ms. The others are the common shape of the gains and
+    the last three arguments.
 
-    ``dead_s``: dead times that replace the dead time of ``loop``.
-
-    ``begun``: initial position of the wheel between two ticks of the encoder, 0 to 1.
-
-    ``sent_s``: time at which the board first sends its tick counts. While it sends, it notices
-    encoder ticks late. None: it sends nothing.
+    * ``dead_s``: replaces the dead time of ``loop``.
+    * ``begun``: initial position of the wheel between two encoder ticks, 0 to 1.
+    * ``sent_s``: time at which the board first sends its tick counts, and so notices ticks late;
+      None: never.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -171,11 +161,9 @@ def answer(
 class Traits:
     """Characteristics of a step response, as numbers or arrays.
 
-    ``overshoot``: as a fraction of the final speed or of the target, whichever is higher.
-
-    ``settled_s``: settling time, in s. Infinite if the speed does not stay at the target.
-
-    ``error_s``: integral of the absolute error divided by the target, in s.
+    * ``overshoot``: as a fraction of the final speed or of the target, whichever is higher.
+    * ``settled_s``: settling time, in s; infinite if the speed does not stay at the target.
+    * ``error_s``: integral of the absolute error divided by the target, in s.
     """
 
     overshoot: Array
@@ -186,10 +174,8 @@ class Traits:
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
     """Return the characteristics of a step response to the set-point ``target_rpm``.
 
-    ``rpm``: the speed every 1 ms.
-
-    ``band``: allowed deviation from the final speed, as a fraction of it. The final speed is the
-    mean of the last quarter of ``rpm``.
+    * ``rpm``: the speed every 1 ms.
+    * ``band``: allowed deviation from the final speed (mean of the last quarter), as a fraction.
     """
     comes_to = _final_rpm(rpm)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)

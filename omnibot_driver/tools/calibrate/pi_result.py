@@ -36,10 +36,7 @@ class Measured:
 
     @property
     def overshoot(self) -> float:
-        """Overshoot of the mean of all steps, as a fraction of the final speed.
-
-        The mean is smoothed over 0.2 s. Otherwise, noise would raise its peak.
-        """
+        """Overshoot of the smoothed mean (0.2 s) of all steps, as a fraction of the final speed."""
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
         calm = np.convolve(mean, np.full(10, 0.1), "valid")
@@ -47,9 +44,9 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Integral of the absolute error of a step, divided by the final speed, in s.
+        """Mean integral of the absolute error of a step, divided by the final speed, in s.
 
-        The integral begins at the first tick. The value is the mean of all steps.
+        The integral begins at the first tick.
         """
         errors = []
         for one in self.steps:
@@ -62,11 +59,9 @@ class Measured:
 class WheelTuned:
     """The result of the tuning of one wheel.
 
-    ``fit``: the plant that was fitted to the starts at full duty.
-
-    ``plant``: the plant for which the gains were tuned.
-
-    ``before``, ``after``: steps with the previous and with the new gains.
+    * ``fit``: the plant that was fitted to the starts at full duty.
+    * ``plant``: the plant for which the gains were tuned.
+    * ``before``, ``after``: steps with the previous and the new gains.
     """
 
     name: str

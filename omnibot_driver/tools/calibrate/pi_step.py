@@ -3,9 +3,9 @@
 """``calibrate step`` for a board that records encoder ticks and accepts gains.
 
 1. Record steps with the current gains.
-2. At a constant duty, find how much the two levels of each encoder's signal differ in duration.
+2. Measure the levels of each encoder's signal at a constant duty.
 3. Fit each plant (motor with wheel) to starts at full duty.
-4. In several rounds, compute gains, record steps, and fit the dead time for the next round.
+4. Repeat: compute gains, record steps, fit the dead time.
 """
 
 import argparse
@@ -38,18 +38,13 @@ FIRST_RPM: Final = 30.0
 """Set-point, in RPM, of the steps that are recorded before the plants are known."""
 ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
-"""Longest time until settings have reached the board, in s.
-
-The board does not acknowledge settings. The driver therefore sends each setting several times.
-"""
+"""Longest time until settings have reached the board, in s. The driver sends each setting several
+times, because the board does not acknowledge settings."""
 
 QUIET_S: Final = 0.5
-"""Period, in s, with which the board sends its tick counts during a record.
-
-The period is long, because the board can miss encoder ticks while it sends. The tool does not set
-it if the user has set no period: it could not restore the board's own period, which is nearly as
-long.
-"""
+"""Period, in s, with which the board sends its tick counts during a record, because it can miss
+encoder ticks while it sends. Not set if the user has set no period, which the tool could not
+restore."""
 OWN_PERIOD_S: Final = 0.4
 """Period, in s, with which a board sends its tick counts after a boot."""
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
@@ -65,8 +60,7 @@ Records = dict[str, list[Column]]
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     """Record the wheels, fit their plants, tune their gains, and measure the effect.
 
-    Raises ToolError if a record or a fit fails. Before it raises the error, the tool tries to
-    restore the parameters.
+    Raises ToolError if a record or a fit fails, after an attempt to restore the parameters.
     """
     goals = Goals(
         overshoot=arguments.overshoot / 100,
@@ -118,7 +112,7 @@ def _require_full_duty(parameters: Mapping[str, Any]) -> None:
 class _Bench:
     """Sets parameters, and records the wheels of the robot, which is on a box.
 
-    ``show``: function that is called after each record, with the number of records made until then.
+    ``show``: called after each record, with the number of records until then.
     """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
@@ -207,8 +201,8 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 def _encoders(bench: _Bench) -> dict[str, Levels]:
     """Measure and set the corrections of the encoders, by wheel.
 
-    An encoder's signal has two levels of unequal duration. The corrections are factors that make
-    the recorded durations equal. During the measurement, all factors are 1.
+    The corrections are factors that make the durations of the two levels of an encoder's signal
+    equal.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})

@@ -32,44 +32,30 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Starting positions of a simulated wheel between two encoder ticks, as fractions of a tick.
-
-The starting position decides in which control period a tick arrives.
-"""
+"""Starting positions of a simulated wheel between two encoder ticks, as fractions of a tick. They
+decide in which control period a tick arrives."""
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Times in a simulated step at which the board first sends tick counts.
-
-They are fractions of the sending period. While the board sends, it notices encoder ticks late.
-"""
+"""Times in a simulated step at which the board first sends tick counts, as fractions of the sending
+period. While the board sends, it notices encoder ticks late."""
 DISTURBED: Final = 0.02
-"""Additional overshoot that is allowed if the board sends its tick counts during a step.
-
-It is a fraction of the speed, and is added to the user's limit.
-"""
+"""Additional overshoot, as a fraction of the speed, that is allowed if the board sends its tick
+counts during a step."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
-"""Candidates for Td above 0, as fractions of the nominal control period.
-
-They are used only if a phase margin is required. Td must then be above 0: with Td = 0, an
-oscillation from one control period to the next would not decay.
-"""
+"""Candidates for Td, as fractions of the nominal control period, if a phase margin is required.
+With Td = 0, an oscillation between control periods would not decay."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
     """The goals of a tuning, for the response to a step of the set-point.
 
-    ``overshoot``: largest overshoot, as a fraction of the speed.
-
-    ``band``: largest deviation from the final speed after the step has settled, as a fraction of
-    the final speed.
-
-    ``destination``: set-point, as a fraction of the speed at full duty.
-
-    ``settled_s``: settling time above which the tool warns, in s.
-
-    ``phase_margin_deg``: smallest phase margin. If None, Td is 0 and the overshoot limits the gain.
+    * ``overshoot``: largest overshoot, as a fraction of the speed.
+    * ``band``: largest deviation of a settled step, as a fraction of the final speed.
+    * ``destination``: set-point, as a fraction of the speed at full duty.
+    * ``settled_s``: settling time above which the tool warns, in s.
+    * ``phase_margin_deg``: smallest phase margin. None: Td is 0, and the overshoot limits the gain.
     """
 
     overshoot: float = 0.05
@@ -133,11 +119,7 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
-    """Return the set-point after the step, in RPM.
-
-    It is the fraction ``goals.destination`` of the speed at full duty, rounded to whole RPM. If the
-    result is below 5 RPM, it is 5 RPM.
-    """
+    """Return the set-point after the step (``goals.destination``) in whole RPM, at least 5 RPM."""
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 
 
@@ -158,8 +140,7 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
     """Predict a step from several starting positions of the wheel, and return its traits.
 
-    The result has the largest overshoot, the longest settling time and the mean of ``error_s`` over
-    all starting positions.
+    They are the largest overshoot, the longest settling time and the mean ``error_s``.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -186,7 +167,7 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, with which the model explains the steps of all wheels best.
 
-    The result is at least 0.02 s, because gains that are tuned for too short a dead time overshoot.
+    The result is at least 0.02 s, so that the tuned gains do not overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

@@ -2,10 +2,8 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A bias of the accelerometer at right angles to gravity has the same effect on the readings as a tilt
-of the sensor or a slope of the floor. So only the part of the bias along gravity is found.
-
-This module knows readings; it does not know how they are recorded.
+The accelerometer's bias is found along gravity only; across it, a bias looks like a tilt. This
+module does not know how readings are recorded.
 """
 
 from collections.abc import Callable
@@ -32,11 +30,9 @@ LOST_PART: Final = 0.02
 class Rest:
     """The evaluation of an IMU at rest. Arrays have one value for each of the sensor's axes.
 
-    ``bias_sigma``: standard deviation of the gyro's bias at the end of the measurement.
-
-    ``rate_noise``, ``force_noise``: standard deviation of a single reading.
-
-    ``curves``, ``noises``: the gyro's Allan deviations and fitted noise terms, for each axis.
+    * ``bias_sigma``: standard deviation of the gyro's bias at the end of the measurement.
+    * ``rate_noise``, ``force_noise``: standard deviation of a single reading.
+    * ``curves``, ``noises``: the gyro's Allan deviations and fitted noise terms.
     """
 
     bias_radps: Column

@@ -2,8 +2,8 @@
 
 """The robot as a calibration uses it: receive its data, and move it.
 
-Every motion goes through ``drive`` or ``record``, which always end with stop commands. This module
-knows data and commands; it does not know what is calibrated.
+All motion goes through ``drive`` or ``record``, which end with stop commands. This module does not
+know what is calibrated.
 """
 
 import math
@@ -34,10 +34,8 @@ PERIOD_S: Final = 0.02
 """Period, in s, with which the tool sends commands."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""Time, in s, from the tool's request for a record to the start of the motion.
-
-The tool waits for this time, so that the driver can repeat a lost request.
-"""
+"""Time, in s, from the request for a record to the start of the motion, so that the driver can
+repeat a lost request."""
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
 """Time in s for which the robot must be at rest before the tool regards it as stopped."""
@@ -56,11 +54,8 @@ class Robot(Listener):
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """For each topic and command: number of this node's messages that have not come back yet.
-
-        This node subscribes to its own topics, so its messages come back. A negative number shows
-        that another node has published this command.
-        """
+        """For each topic and command: number of this node's messages that have not come back yet. A
+        negative number shows a command of another node."""
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
             "cmd_vel": TwistStamped if self._stamped else Twist,
@@ -103,19 +98,17 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the control law ``law``, within ``bounds``. Then stop it.
+        """Move the robot by the control law ``law``, within ``bounds``, and stop it.
 
-        Return the log of the motion.
+        Return the log.
 
-        ``obeys``: whether to raise an error if the robot does not move.
-
-        ``monitored``: whether the driver's motion monitor stays on. It must be off until speed and
-        direction are calibrated.
-
-        ``show``: function that is called with the seconds since the start of the motion.
+        * ``obeys``: whether to raise an error if the robot does not move.
+        * ``monitored``: whether the driver's motion monitor stays on; off until speed and direction
+          are calibrated.
+        * ``show``: called with the seconds since the start of the motion.
 
         Raises ToolError on an e-stop, lost data, another node's command, a motion beyond the
-        bounds, no motion, a robot that does not come to rest, or clocks that differ.
+        bounds, no motion, no standstill at the end, or clocks that differ.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
@@ -146,8 +139,8 @@ class Robot(Listener):
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
         """Let the driver record the response to ``command``; return the path of the record's file.
 
-        The robot must be at rest. Raises ToolError on an e-stop, lost data, or a failure that the
-        driver reports. Commands of other nodes are not noticed.
+        The robot must be at rest. Raises ToolError on an e-stop, lost data, or a failure in the
+        driver. Other nodes' commands are not noticed.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)
@@ -276,9 +269,9 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if this program has sent no command for longer than the driver's timeout.
+        """Raise ToolError if no command was sent for longer than the driver's timeout.
 
-        In this case, the driver has stopped the robot. ``silence_s``: time since the last command.
+        The driver has then stopped the robot. ``silence_s``: time since the last command.
         """
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(

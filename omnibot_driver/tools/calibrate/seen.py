@@ -2,8 +2,8 @@
 
 """The user's answers about the directions in which the wheels turn.
 
-A pattern has one number for each of the wheels A, B and C, seen from outside. 1: counter-clockwise
-(positive in the manual), -1: clockwise, 0: still.
+A pattern has a number for each of the wheels A, B and C, seen from outside: 1 counter-clockwise
+(positive in the manual), -1 clockwise, 0 still.
 """
 
 from collections.abc import Sequence
@@ -45,9 +45,7 @@ def in_words(pattern: Sequence[int]) -> str:
 def wanted(axis: int) -> Pattern:
     """Return the directions of wheels A, B and C in a motion along +x, +y or +yaw.
 
-    The directions follow from the manual's equations.
-
-    ``axis``: 0 for x, 1 for y, 2 for yaw.
+    Source: the manual's equations. ``axis``: 0 for x, 1 for y, 2 for yaw.
     """
     x, y, yaw = (float(axis == n) for n in range(3))
     rates = OmniKinematics(1.0, 1.0).wheel_rates(BodyTwist(x, y, yaw))
@@ -101,8 +99,7 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether a robot with these signs of its axes would be a mirror image of the real one.
 
-    This is so if sign(x) sign(y) differs from sign(yaw). If the user only takes another side of the
-    robot for its front, the result is False.
+    The result is False if the user only takes another side for the front.
     """
     x, y, yaw = signs
     return x * y != yaw

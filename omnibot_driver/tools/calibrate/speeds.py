@@ -2,8 +2,8 @@
 
 """Plan commands, measure the speeds that result, and fit the scale.
 
-A *count* is the unit of the board's commands. Commands are whole counts, so they have no rounding
-error. This module knows logs; it does not know the robot.
+A *count* is the unit of the board's commands, which are whole counts here. This module does not
+know the robot.
 """
 
 from collections.abc import Sequence
@@ -17,34 +17,25 @@ from omnibot_driver.tools.calibrate.log import Column, Log
 from omnibot_driver.tools.needs import ToolError
 
 SETTLE_S: Final = 1.2
-"""Time from a command to a steady speed, in s.
-
-After 1 s, the speed still differs by 0.1 %, because the board's integrator has not settled.
-"""
+"""Time from a command to a steady speed, in s. After 1 s, the speed still differs by 0.1 %."""
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
 """Lower limit of two estimated standard deviations: that of a pose, in m or rad, and that of the
 gyro's mean rate, in rad/s."""
 CORRECTED_WITH: Final = 5
-"""Number of successive odometry steps over which the driver spreads a correction of the pose.
-
-The tool regards this number of steps as one independent measurement.
-"""
+"""Number of successive odometry steps that count as one measurement. The driver spreads a
+correction of the pose over these steps."""
 
 
 @dataclass(frozen=True, slots=True)
 class Speed:
     """One steady speed along an axis, in m/s or rad/s.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw.
-
-    ``counts``: the commanded counts.
-
-    ``measured``, ``sigma``: speed by the odometry, and its standard deviation.
-
-    ``gyro``, ``gyro_sigma``: rate by the gyro, and its standard deviation. ``gyro`` is NaN for x
-    and y.
+    * ``axis``: 0 for x, 1 for y, 2 for yaw.
+    * ``counts``: the commanded counts.
+    * ``measured``, ``sigma``: speed by the odometry, and its standard deviation.
+    * ``gyro``, ``gyro_sigma``: the same by the gyro; ``gyro`` is NaN for x and y.
     """
 
     axis: int
@@ -72,8 +63,9 @@ class Scale:
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
     """Return pairs of a duration in s and a command, in both directions along each axis.
 
-    ``top``: largest speeds. ``scales``: counts per m/s or rad/s. ``levels``: number of speeds for
-    each axis.
+    * ``top``: largest speeds.
+    * ``scales``: counts per m/s or rad/s.
+    * ``levels``: number of speeds per axis.
     """
     stairs = []
     for level in range(1, levels + 1):
@@ -87,11 +79,10 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Return one measured speed for each command in the log that stayed the same for long enough.
+    """Return one measured speed for each command that stayed the same for long enough.
 
-    ``scales``: counts per m/s or rad/s, for x, y and yaw.
-
-    ``up``, ``bias``: the upward direction and the gyro's bias (rad/s), in the sensor's axes.
+    * ``scales``: counts per m/s or rad/s, for x, y and yaw.
+    * ``up``, ``bias``: upward direction and gyro bias (rad/s), in the sensor's axes.
 
     Raises ToolError if the log has no steady speed.
     """
@@ -147,8 +138,7 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
     """Return the time spans of steady speed as (begin in s, end in s, command).
 
-    Spans of zero commands are omitted. If no command was sent for more than 0.2 s
-    (``REPEATED_WITHIN_S``), a new span begins, because the driver may have stopped the robot.
+    Zero commands are omitted. A pause of more than 0.2 s (``REPEATED_WITHIN_S``) ends a span.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -169,10 +159,9 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the coordinate of each pose along one axis of the robot.
+    """Return the coordinate of each pose along one axis of the robot at the mean heading.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. The axes x and y turn with the robot. Here, they have one
-    direction for all poses: the direction at the mean heading.
+    ``axis``: 0 for x, 1 for y, 2 for yaw.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -23,10 +23,8 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 RUN_UP_S: Final = 2.0
-"""Time, in s, that the tool allows a wheel for the start from rest to the first speed.
-
-Friction affects this start, so the tool does not evaluate it.
-"""
+"""Time, in s, for the start from rest to the first speed. The start is not evaluated, because
+friction affects it."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -79,11 +77,10 @@ def _record(
 def _to_and_fro(
     levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
 ) -> tuple[Law, float]:
-    """Return a control law for a wheel, and the duration of this law in s.
+    """Return a control law that alternates between two speeds, and its duration in s.
 
-    The wheel alternates between the slow and the fast speed. Each step from one speed to the other
-    begins at a different phase of the period of the odometry deltas. So the deltas of all steps
-    together show the whole response.
+    The steps begin at different phases of the odometry deltas, which together show the whole
+    response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -104,7 +101,7 @@ def _wheels(names: str) -> str:
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
     """Return the slow and the fast speed in rad/s, rounded to whole units of the board's command.
 
-    Raises ToolError if a speed is not allowed, or if the two speeds are equal.
+    Raises ToolError if an option is not allowed, or if the speeds are equal.
     """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:

@@ -2,8 +2,8 @@
 
 """Fit models with uncertainties to recorded steps of one wheel.
 
-Time 0 of a step is its *onset*: the first control tick that could use the command. This module
-knows commands and wheel rates; it does not know how they were recorded.
+Time 0 of a step is its *onset*: the first control tick that could use the command. This module does
+not know how data were recorded.
 """
 
 import math
@@ -25,10 +25,8 @@ from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Gains, Motor
 from omnibot_driver.tools.needs import ToolError
 
 ON_THE_WAY_S: Final = 0.0015
-"""Time, in s, from the publication of a command to its last bit on the line.
-
-It is the time that DDS needs to deliver the command, plus the time of 9 bytes at 115200 baud.
-"""
+"""Time, in s, from the publication of a command to its last bit on the line: delivery by DDS, and 9
+bytes at 115200 baud."""
 BEFORE: Final = 3
 """Number of odometry deltas before the onset that belong to the record of a step."""
 FEWEST_DELTAS: Final = 10
@@ -48,16 +46,11 @@ DRAWS: Final = 100
 class Step:
     """One step from one commanded rate to another. Ticks are control ticks.
 
-    ``before_radps``, ``after_radps``: commanded rates before and after the step.
-
-    ``end_ticks``: end of each odometry delta, in ticks after the onset of the step.
-
-    ``rate_radps``: mean rate in each odometry delta, which lasts four ticks.
-
-    ``last_radps``: commanded rate before the previous step. The effect of that step may still
-    continue.
-
-    ``last_ticks``: time from the onset of the previous step to this onset.
+    * ``before_radps``, ``after_radps``: commanded rates.
+    * ``end_ticks``: end of each odometry delta, in ticks after the onset.
+    * ``rate_radps``: mean rate in each odometry delta, which lasts four ticks.
+    * ``last_radps``: commanded rate before the previous step, whose effect may continue.
+    * ``last_ticks``: time from the previous onset to this onset.
     """
 
     before_radps: float
@@ -74,8 +67,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: function that returns the model's mean rate in each delta after a unit step. Its
-        argument has one time for each delta: from the unit step to the end of the delta, in ticks.
+        ``mean``: returns the model's mean rates in deltas after a unit step, by their ends in
+        ticks.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -90,11 +83,9 @@ class Step:
 class Fit:
     """A model with the parameter values that explain the steps best.
 
-    ``covariance``: covariance of ``values``, scaled by the residuals.
-
-    ``rms_radps``: root mean square of the residuals.
-
-    ``samples``: number of odometry deltas used.
+    * ``covariance``: covariance of ``values``, scaled by the residuals.
+    * ``rms_radps``: root mean square of the residuals.
+    * ``samples``: number of odometry deltas used.
     """
 
     model: Model
@@ -110,10 +101,7 @@ class Fit:
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion.
-
-        The better of two fits to the same steps has the smaller value.
-        """
+        """Akaike's information criterion: the better of two fits has the smaller value."""
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
@@ -141,9 +129,7 @@ class Fit:
 
 
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
-    """Return the steps of one wheel from one commanded rate to another.
-
-    ``levels``: the rates, in rad/s. Steps from or to another rate are left out.
+    """Return the steps of one wheel between the commanded rates ``levels``, in rad/s.
 
     Raises ToolError if gaps in the odometry leave no complete step.
     """
@@ -205,11 +191,10 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 class WheelFound:
     """The results of one wheel.
 
-    ``steps``: the steps that were used. ``left_out``: number of rejected steps.
-
-    ``first``, ``second``: fits of models of first and second order.
-
-    ``motor_fit``: fit of a motor in the manual's control loop.
+    * ``steps``: the steps that were used.
+    * ``left_out``: number of rejected steps.
+    * ``first``, ``second``: fits of models of first and second order.
+    * ``motor_fit``: fit of a motor in the manual's control loop.
     """
 
     name: str
@@ -221,10 +206,9 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The better one of two fits: the fit of first order, and the fit of second order.
+        """The better fit of ``first`` and ``second``, by Akaike's information criterion.
 
-        Akaike's information criterion decides which fit is better. Neither model assumes anything
-        about the control loop.
+        Neither model assumes anything about the control loop.
         """
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
@@ -250,8 +234,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with their onsets shifted so that the steps fit the model best.
 
-    The tool computes an onset from the time of a command. If a busy computer delays the command,
-    the true onset is later.
+    A busy computer can delay a command, and so the true onset.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

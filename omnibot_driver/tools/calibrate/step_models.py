@@ -2,9 +2,8 @@
 
 """Models of a wheel's step response, as the odometry measures it.
 
-A model gives the angle that the wheel has turned since a step. Each delta of the odometry gives the
-mean rate over 40 ms, which is the difference of two such angles divided by 40 ms. This module knows
-models and times; it does not know measured data.
+A model gives the wheel's angle after a step, from which the mean rate in a delta of 40 ms follows.
+This module does not know measured data.
 """
 
 from collections.abc import Callable
@@ -33,11 +32,9 @@ Arguments: the model's parameters without the gain, and times after the step in 
 class Model:
     """A model of a step response.
 
-    ``names``, ``units``: names and units of the parameters. The first parameter is the gain.
-
-    ``start``, ``low``, ``high``: starting values and bounds of the parameters.
-
-    ``turned``: the function ``Turned`` of this model.
+    * ``names``, ``units``: names and units of the parameters. The first parameter is the gain.
+    * ``start``, ``low``, ``high``: starting values and bounds of the parameters.
+    * ``turned``: the function ``Turned`` of this model.
     """
 
     title: str
@@ -70,8 +67,8 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 def second_order(parameters: Array, time_s: Array) -> Array:
     """Return the angle turned after a unit step, by a transfer function of second order.
 
-    It is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). The zero Z comes from the PI loop with
-    feed-forward. ``parameters``: ω in rad/s, ζ, Z and L in s.
+    (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²), with the zero Z of a PI loop with feed-forward.
+    ``parameters``: ω in rad/s, ζ, Z and L in s.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
@@ -88,8 +85,7 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 def motor_in_loop(gains: Gains) -> Turned:
     """Return a function that gives the step response of a motor in the manual's control loop.
 
-    The function has three parameters, which describe the motor: the effort in PWM steps for a speed
-    of one count per tick, the time constant in s, and the delay in s.
+    Its parameters: PWM steps for a speed of one count per tick, time constant and delay in s.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

@@ -13,28 +13,20 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains
 UNLIKE_ONE: Final = 0.02
 """Difference of a wheel's gain from 1 above which the tool recommends ``calibrate scale``."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
-
-The encoder and the protocol's unit of 0.1 mm cause the quantisation.
-"""
+"""Standard deviation, in rad/s, of the rate of an odometry delta, due to quantisation by the
+encoder and the protocol's unit of 0.1 mm."""
 MANY: Final = 1.5
-"""Limit for the ratio of the residuals to the quantisation error. Above it, the tool warns.
-
-Large residuals may mean that the computer delayed commands. The residuals are then twice as large
-as usual, and the delay that the tool finds for the wheel is 4 ms too long.
-"""
+"""Ratio of the residuals to the quantisation error above which the tool warns. Delayed commands
+double the residuals, and make the wheel's delay 4 ms too long."""
 UNEXPLAINED: Final = 1.2
-"""Largest accepted ratio of two residuals: the motor model's, divided by the second-order model's.
-
-Above this ratio, the tool regards the motor model as wrong.
-"""
+"""Ratio of the motor model's residual to the second-order model's, above which the motor model is
+regarded as wrong."""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
     """Find better gains, and return the result.
 
-    ``now``: the gains in the firmware. The firmware has one set of gains for all wheels, so the
-    better gains are also the same for all wheels.
+    ``now``: the gains in the firmware. All wheels have the same gains.
     """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)

@@ -2,8 +2,8 @@
 
 """Fit a plant to the times between encoder ticks of a wheel that starts at full duty.
 
-A record begins at its first tick, so it does not show the dead time. This module knows times
-between ticks; it does not know how they were recorded.
+Records begin at the first tick, so they do not show the dead time. This module does not know how
+records are made.
 """
 
 import math
@@ -27,13 +27,9 @@ FEWEST_TICKS: Final = 30
 class Plant:
     """A wheel, as a plant from duty in percent to speed in RPM.
 
-    ``rpm_per_percent``: the gain.
-
-    ``slow_s``, ``fast_s``: time constants. ``fast_s`` is 0 for a plant of first order.
-
-    ``dead_zone_percent``: duty up to which the wheel does not turn.
-
-    The final speed is the gain times the duty above the dead zone.
+    * ``rpm_per_percent``: final speed per percent of duty above the dead zone.
+    * ``slow_s``, ``fast_s``: time constants; ``fast_s`` is 0 for a plant of first order.
+    * ``dead_zone_percent``: duty up to which the wheel does not turn.
     """
 
     rpm_per_percent: float
@@ -50,11 +46,10 @@ class Plant:
 class PlantFit:
     """The fit of a plant to records of starts.
 
-    ``sigmas``: standard deviations of ``final_rpm``, ``slow_s`` and ``fast_s``.
-
-    ``rms``: root mean square of the relative residuals.
-
-    ``samples``: number of residuals. ``order``: order of the plant, 1 or 2.
+    * ``sigmas``: standard deviations of ``final_rpm``, ``slow_s`` and ``fast_s``.
+    * ``rms``: root mean square of the relative residuals.
+    * ``samples``: number of residuals.
+    * ``order``: order of the plant, 1 or 2.
     """
 
     final_rpm: float
@@ -65,11 +60,8 @@ class PlantFit:
     samples: int
     order: int
     marks: Marks | None = None
-    """Distances between the encoder's marks; None if the marks are assumed to be evenly spaced.
-
-    Uneven marks cause errors of the times between ticks that repeat with each turn. If the tool
-    finds no such errors, it assumes evenly spaced marks.
-    """
+    """Distances between the encoder's marks; None if the times between ticks show no errors that
+    repeat with each turn."""
 
     @property
     def aic(self) -> float:
@@ -91,9 +83,8 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     """Fit a plant to records of starts from standstill, all at the same duty.
 
-    ``records``: times between ticks in s. The first time of each record is not used.
-
-    Raises ToolError if a record is too short.
+    ``records``: times between ticks in s; the first one is not used. Raises ToolError if a record
+    is too short.
     """
     # The first time of a record includes the standstill.
     intervals = [record[1:] for record in records]

@@ -2,10 +2,8 @@
 
 """Find the positions of an encoder's marks from several records of a wheel.
 
-A *mark* is a place on the encoder's disc at which the board counts a tick. If the distances between
-marks are uneven, the times between ticks have errors that repeat in each turn of the wheel. It is
-not known at which mark a record begins. Input: these errors; output: the distances between the
-marks.
+A *mark* is a place on the encoder's disc at which the board counts a tick. Uneven marks cause
+errors in the times between ticks, which repeat in each turn.
 """
 
 from collections.abc import Sequence
@@ -19,21 +17,14 @@ Column = NDArray[np.float64]
 
 ROUNDS: Final = 4
 LARGEST: Final = 0.5
-"""Largest plausible relative error of a time between ticks.
-
-A larger error shows that the board has missed an edge of the encoder's signal.
-"""
+"""Largest plausible relative error of a time between ticks. A larger error shows a missed edge of
+the encoder's signal."""
 OUTLIER: Final = 4.5
-"""Relative errors of times between ticks are used only up to this size, in standard deviations.
-
-The standard deviation is estimated from the median size of all errors.
-"""
+"""Size, in standard deviations, up to which a relative error of a time between ticks is used. The
+standard deviation is estimated from the median size of all errors."""
 EXPLAINED: Final = 0.4
-"""Fitted marks are accepted only if they explain at least this fraction of the variance.
-
-If the marks of an encoder are evenly spaced, fitted marks explain less than 0.2. This value comes
-from a test with three records of two turns each.
-"""
+"""Smallest fraction of the variance that fitted marks must explain. For evenly spaced marks, the
+fraction is below 0.2 (test with three records of two turns each)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +53,7 @@ class Marks:
     def expected(self, first: int, count: int) -> Column:
         """Return the relative errors that the marks cause in ``count`` times between ticks.
 
-        The times follow each other. ``first``: number of the mark at which the first of them
-        begins.
+        ``first``: number of the mark at which the first time begins.
         """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
@@ -71,9 +61,8 @@ class Marks:
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
     """Return the marks that explain the records' errors, or None if no pattern repeats each turn.
 
-    ``rows``: for each record, the relative errors of its times between ticks, NaN if unknown.
-
-    ``marks``: number of marks on the encoder's disc.
+    * ``rows``: for each record, the relative errors of its times between ticks, NaN if unknown.
+    * ``marks``: number of marks on the disc.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)
@@ -95,13 +84,10 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the number of the mark at which a record begins.
+    """Return the number of the mark at which a record begins: ``row`` then matches ``steps`` best.
 
-    It is the mark for which ``row`` agrees best with ``steps``.
-
-    ``row``: relative errors of the record's times between ticks.
-
-    ``steps``: for each mark, the relative error of the distance to the next mark.
+    * ``row``: relative errors of the record's times between ticks.
+    * ``steps``: relative errors of the distances from each mark to the next.
     """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
@@ -110,13 +96,12 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return, for each mark, the relative error of the distance to the next mark.
+    """Return the relative errors of the distances from each mark to the next.
 
-    Each error is the median over all turns in all records, minus the mean of these medians.
+    Each is the median over all turns, minus the mean of the medians.
 
-    ``rows``: for each record, the relative errors of its times between ticks.
-
-    ``firsts``: for each record, the number of the mark at which the record begins.
+    * ``rows``: for each record, the relative errors of its times between ticks.
+    * ``firsts``: for each record, the number of its first mark.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

@@ -2,7 +2,7 @@
 
 """Read records of the times between a wheel's ticks, and measure the encoder's levels.
 
-A record is a CSV file of the driver. This module knows files and times; it does not know the plant.
+A record is a CSV file of the driver. This module does not know the plant.
 """
 
 import csv
@@ -20,21 +20,15 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest accepted fraction of missing times in a record."""
 UNLIKE: Final = 1.5
-"""Largest accepted factor by which a time between ticks differs from the median, up or down.
-
-A larger factor shows that the board missed an edge of the encoder's signal or noticed it late.
-"""
+"""Largest accepted ratio of a time between ticks to the median, or of the median to the time. A
+larger ratio shows an edge that the board missed or noticed late."""
 SMOOTHED: Final = 4
-"""Number of successive times between ticks that are added up to compute one speed.
-
-If one mark of the encoder is displaced, only the sums that begin or end at this mark are wrong.
-"""
+"""Number of successive times between ticks that are added up to compute one speed, so that a
+displaced mark disturbs few speeds."""
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Return the times between ticks in s, for the left and the right wheel.
-
-    A missing time is NaN.
+    """Return the times between ticks in s, for the left and the right wheel; NaN if missing.
 
     Raises ToolError if the file cannot be read, or if too many times are missing.
     """
@@ -61,9 +55,9 @@ def read(path: Path) -> dict[str, Column]:
 class Levels:
     """Corrections of the two levels of an encoder's signal, for one wheel.
 
-    ``short``, ``long``: factors that give both levels the same duration.
-
-    ``sigma``: standard deviation of the factors. ``rpm``: speed during the measurement.
+    * ``short``, ``long``: factors that give both levels the same duration.
+    * ``sigma``: standard deviation of the factors.
+    * ``rpm``: speed during the measurement.
     """
 
     short: float
@@ -75,10 +69,8 @@ class Levels:
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of the two levels of an encoder's signal, which differ in duration.
 
-    ``ticks_s``: times between the ticks of a wheel at constant duty. The board must have recorded
-    them with both corrections set to 1.
-
-    Raises ToolError for irregular ticks.
+    ``ticks_s``: times between ticks at constant duty, with both corrections set to 1. Raises
+    ToolError for irregular ticks.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)
@@ -125,10 +117,7 @@ class Response:
 
 
 def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
-    """Return the step response in a record.
-
-    The first time of the record is not used, because it includes the standstill.
-    """
+    """Return the step response in a record, without the first time (it includes the standstill)."""
     times_s = ticks_s[1:].copy()
     times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
     ends_s = np.concatenate(([0.0], np.cumsum(times_s)))

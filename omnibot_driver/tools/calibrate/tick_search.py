@@ -2,10 +2,11 @@
 
 """A least-squares fit of a plant to the times between encoder ticks of several starts.
 
-The plant is the motor with its wheel. A *mark* is a place on the encoder's disc at which the board
-counts a tick. Sometimes the board misses a mark. A *record* has the times between the ticks of one
-start. This module knows the motion of a plant, the marks and the noise; it does not know files, and
-does not choose the plant's order.
+* *Plant*: the motor with its wheel.
+* *Mark*: a place on the encoder's disc at which the board counts a tick, or misses it.
+* *Record*: the times between the ticks of one start.
+
+This module does not know files, and does not choose the plant's order.
 """
 
 import math
@@ -25,10 +26,7 @@ Column = NDArray[np.float64]
 SIGMA: Final = 0.1
 """Assumed relative noise of a time between ticks, until the encoder's marks are fitted."""
 SHARPEST: Final = 0.002
-"""Least assumed relative noise of a time between ticks.
-
-There is always some noise, because the board reports times in steps of 0.1 ms.
-"""
+"""Least assumed relative noise of a time between ticks. The board's unit is 0.1 ms."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
 """Longest allowed sum of both time constants, in s."""
@@ -36,35 +34,24 @@ GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
 """Starting values for the sum of both time constants, in s. There is one search for each value."""
 RATIOS: Final = (0.15, 0.4, 0.8)
-"""Starting values for the ratio of the fast to the slow time constant.
-
-A search that started at 1 would not move away from 1.
-"""
+"""Starting values for the ratio of the fast to the slow time constant. At 1, a search stays."""
 LATEST_S: Final = 2.0
 """Longest allowed time from the start of the wheel to its first tick, in s."""
 MOST_OFF: Final = 0.4
 """Largest allowed displacement of a mark from its evenly spaced position, in ticks."""
 LAGS: Final = 60
-"""Largest distance between two residuals, in ticks, at which their correlation is considered.
-
-The load changes slowly. Therefore residuals are correlated even at this distance.
-"""
+"""Largest distance between two residuals, in ticks, at which their correlation is considered. The
+slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive times between ticks.
+"""Limit for the sum of the relative errors of two successive times between ticks. Above this limit,
+the board has missed a mark in the earlier time, if the earlier error is above half the limit.
 
-If the sum is above the limit, and the earlier error above half of it, the board has missed a mark
-within the earlier time.
-
-* Missed mark: the earlier time covers two distances between marks, so its relative error is 1, and
-  the sum is about 1. The sum is smaller if the board's clock loses time, which can be up to 6 ms.
-* Mark noticed late: the earlier time is too long, and the later one is too short. The sum is near
-  0.
+* Missed mark: the sum is about 1, or smaller if the board's clock loses up to 6 ms.
+* Mark noticed late: the sum is near 0.
 """
 SURE_TICKS: Final = 4
-"""Number of ticks at the start of a record among which no missed mark is searched for.
-
-At the start, the wheel is still so slow that the board notices every mark of the encoder.
-"""
+"""Number of ticks at the start of a record that are not searched for missed marks, because the
+wheel is still so slow that the board notices every mark."""
 OUTLIER: Final = 5.0
 """Error of a time between ticks, in standard deviations, above which the time is not used."""
 FEWEST_RECORDS: Final = 6
@@ -72,10 +59,7 @@ FEWEST_RECORDS: Final = 6
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the distance that a wheel has turned since a step of the duty at time 0.
-
-    The distance is divided by the final speed, so its unit is s.
-    """
+    """Return the distance since a step of the duty at time 0, divided by the final speed, in s."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(times_s - slow_s * (1 - slow))
@@ -87,10 +71,9 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def constants(values: Column, order: int) -> tuple[float, float]:
-    """Return the slow and the fast time constant, in s.
+    """Return the slow and the fast time constant, in s, for the values of a search.
 
-    ``values``: the values of a search. They contain the sum and the ratio of the time constants
-    instead of the constants themselves, because two exchanged constants describe the same plant.
+    The values contain their sum and ratio, because exchanged constants describe the same plant.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -104,11 +87,11 @@ class Search:
 
     The array of values has, in this order:
 
-    - log of the final rate (ticks/s)
-    - log of the sum of both time constants (s)
-    - ratio of the time constants, if the order is 2
-    - for each record, the time from the wheel's start to its first tick (s)
-    - displacements of the marks (ticks), only while they are fitted
+    * log of the final rate (ticks/s)
+    * log of the sum of both time constants (s)
+    * ratio of the time constants, if the order is 2
+    * for each record, the time from the wheel's start to its first tick (s)
+    * displacements of the marks (ticks), only while they are fitted
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -141,10 +124,7 @@ class Search:
         return self._best(starts)
 
     def closely(self, values: Column) -> Column:
-        """Repeat the search with several starting values for the ratio of the time constants.
-
-        This avoids a local optimum.
-        """
+        """Repeat the search with several ratios of the time constants, to avoid a local optimum."""
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
@@ -158,8 +138,7 @@ class Search:
     def off(self, values: Column) -> list[Column]:
         """Return, for each record, the relative errors of its times, assuming evenly spaced marks.
 
-        A record has one error for each distance between neighbouring marks. If the board missed a
-        mark, the errors of the distances before and after this mark are NaN.
+        Each distance between neighbouring marks has one error, which is NaN next to a missed mark.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -172,8 +151,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        If the board missed a mark, the time at that place covers two distances between marks. All
-        later searches take this into account.
+        All later searches expect two distances between marks in a time with a missed mark.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -192,9 +170,8 @@ class Search:
     def with_marks(self, marks: Marks, values: Column) -> Column:
         """Fit the plant together with the marks' positions; return only the plant's values.
 
-        All later searches use the fitted positions.
-
-        ``marks``: the positions from which the fit starts.
+        All later searches use the fitted positions. ``marks``: the positions from which the fit
+        starts.
         """
         self._marks, own = len(marks.steps), len(values)
         self._first_marks = [marks.first(row) for row in self.off(values)]
@@ -207,10 +184,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals, and remove it in all later searches.
 
-        The residuals are correlated for two reasons: the marks have uneven distances, and the load
-        changes slowly. After the marks are fitted, only the load causes the correlation.
-
-        ``values``: the values of the plant for which the residuals are computed.
+        ``values``: the values of the plant. The load, and uneven marks until they are fitted, cause
+        the correlation.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -223,18 +198,16 @@ class Search:
     def left(self, values: Column) -> Column:
         """Return the relative residuals for ``values``, without outliers.
 
-        If ``correlate`` has measured the correlation of the residuals, this correlation is removed.
+        A correlation that ``correlate`` has measured is removed.
         """
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
 
     def covariance(self, values: Column) -> Column:
-        """Return the covariance of the plant's own values, which are the same in all records.
+        """Return the covariance of the values that all records share.
 
-        The covariance is computed from the residuals. But the load changes slowly, so the results
-        of the records can differ by more than the residuals predict. If they do, the covariance is
-        increased until it covers these differences.
+        The covariance follows from the residuals, and is increased if the records differ more.
         """
         own = 1 + self.order
         found = self._search(values)
@@ -313,8 +286,7 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the predicted times between ticks in s, record after record.
 
-        ``off``: displacements of the marks. If None, they come from ``values`` or from an earlier
-        fit.
+        ``off``: displacements of the marks. None: from ``values`` or from an earlier fit.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)
