@@ -43,26 +43,26 @@ def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
 
 
 def reach(bench: MartBench, goal: Pose) -> str:
-    """Command the goal, and wait until it is over or discarded.
+    """Command the goal, and wait until it is over, or until the session has dropped it.
 
     Return the texts of all notices that came in this time, joined to one text.
     """
-    seen, texts = len(bench.events), list[str]()
+    since, pilot = len(bench.events), bench.board._pilot
 
     def ended() -> bool:
-        nonlocal seen
-        texts.extend(each.text for each in bench.events[seen:] if isinstance(each, Notice))
-        seen = len(bench.events)
-        return pilot.goal_progress.startswith("over") or any("discarded" in text for text in texts)
+        return pilot.goal_progress.startswith("over") or not holds_command(bench)
 
     bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
     bench.run(0.1)
-    pilot = bench.board._pilot
     bench.run_until(ended, 120.0)
     bench.run(3.0)
     assert bench.robot.stands
-    ended()
-    return " ".join(texts)
+    return " ".join(each.text for each in bench.events[since:] if isinstance(each, Notice))
+
+
+def holds_command(bench: MartBench) -> bool:
+    """Return whether the session still has a command: no fault and no stop has ended it."""
+    return bench.session._commands.current is not None
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
@@ -118,7 +118,8 @@ def main() -> None:
             bench, random = on(faults, EVERY_FIRMWARE[seed % 3], seed), Random(seed)
             for _ in range(GOALS):
                 goal = random_goal(random)
-                discarded += "discarded" in reach(bench, goal)
+                reach(bench, goal)
+                discarded += not holds_command(bench)
                 reached += bench.truth.way_to(goal).way_m < NEAR_M
                 worst_m = max(worst_m, bench.error.way_m)
         goals = GOALS * count

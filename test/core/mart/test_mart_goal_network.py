@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from honesty import RARE, nees
 from mart_bench import MartBench
-from mart_goals import EVERY_FIRMWARE, drops, on, random_goal, reach, yaw_error
+from mart_goals import EVERY_FIRMWARE, drops, holds_command, on, random_goal, reach, yaw_error
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings as Settings
@@ -45,6 +45,26 @@ def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed
     """
     bench = on(NetworkFaults(lose=0.25, delay_s=0.01), EVERY_FIRMWARE[seed % 3], seed)
     reach(bench, Pose(0.6, 0.3, 1.5))
+
+
+def test_a_goal_that_another_cause_ends_is_noticed() -> None:
+    """The e-stop ends a goal: the driver does not report "over", and gives no notice of the goal.
+
+    ``reach`` returns nevertheless, as soon as the session has dropped the goal. Regression: a
+    measurement of many goals was aborted after a goal that the driver ended because of a push.
+    """
+    bench = MartBench("source").ready()
+
+    def latches(data: bytes) -> bool:
+        if data.startswith(b"TF"):
+            bench.session.estop(True, bench.now)
+        return False
+
+    drops(bench.robot.network[0].to_board, latches)
+    began_s = bench.now
+    reach(bench, Pose(0.5, 0.0, 0.0))
+    assert bench.now - began_s < 30.0
+    assert not holds_command(bench)
 
 
 def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -> None:
