@@ -212,7 +212,7 @@ class Stops(Ground, ABC):
         if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
             self.conversation.owes(Form.INTEGER, now)
         result, motion = stopping.result, stopping.motion
-        if result is None and motion is not Motion.UNKNOWN and not self.conversation.disturbed(now):
+        if result is None and motion is not Motion.UNKNOWN and not self.conversation.doubles(now):
             result = stopping.doubtful_result  # a repeated stop has found nothing to stop
         if stopping.move is not None and result is None:
             for form in stopping.move.forms:

@@ -7,6 +7,7 @@ import math
 import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
+from mart_goals import drops
 
 from omnibot_driver.core.mart import State
 from omnibot_driver.core.mart.states import ROLLING
@@ -210,6 +211,29 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     monkeypatch.undo()
     bench.speaks = True
     assert bench.until_it_stands() < 1.0
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_a_lost_reply_does_not_make_a_stop_look_like_a_restart(number: int) -> None:
+    """The network has just lost a reply. A drive is stopped as soon as the wheels turn.
+
+    The server answers the start and the stop with ``ok``, and then the repeated stop with "no
+    motion". The driver has seen both replies, and the network has not duplicated any. So it does
+    not take the third one for a sign of a restart, and does not switch the motors off by MCS.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.3, 0.0, 1.0)
+    lost: list[bytes] = drops(
+        bench.robot.network[0].from_board, lambda data: data[:3] == b"ok " and len(lost) <= number
+    )
+    bench.command(0.3, 0.0, 0.5)
+    bench.command(0.0, 0.0, 1.0)
+    since, appeared_s = len(bench.written), bench.board._pilot.appeared_s
+    bench.command_until(0.3, 0.0, lambda: not bench.robot.stands)
+    bench.command(0.0, 0.0, 2.0)
+    assert len(lost) == number + 1
+    assert bench.board._pilot.appeared_s == appeared_s
+    assert b"MCS 128 128" not in bench.said(since)
 
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
