@@ -70,12 +70,11 @@ class Starts(FailedStarts):
             self._estop_said_s = now
             self.proof.stopped(now)
             return self._send(HALTS[Motion.UNKNOWN], now)
-        if self._runs_on and self._switch_off.needed:
-            return self._switch_motors_off(now)  # MCS is safe while the server starts up
-        if now < self.appeared_s + STARTS_UP_S:
+        starts_up = now < self.appeared_s + STARTS_UP_S
+        if self._switch_off.underway or switch_off or (starts_up and self._switch_off.needed):
+            return self._switch_motors_off(now)  # safe while the server starts up, too
+        if starts_up:
             return NO_PACKETS
-        if self._switch_off.underway or switch_off:
-            return self._switch_motors_off(now)
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
         if self.imu.retries(now):

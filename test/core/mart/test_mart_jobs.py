@@ -126,7 +126,6 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
     """The port is lost during a job. The job fails at once, even if the port never comes back."""
     bench = MartBench().ready()
     bench.board.ask(job, "token", bench.now)
-    bench.run(0.02)
     bench.close()
     (done,) = bench.extras(JobDone)
     assert not done.success
