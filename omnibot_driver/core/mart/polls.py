@@ -24,7 +24,9 @@ STILL: Final[Mapping[Word, float]] = {
     SRC: 0.5,
 }
 DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
-TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5, VOLTS: 2.0}
+TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5}
+"""Without VOLTS, because a turn on the spot does not need the voltage. VOLTS crashes a server that
+starts up, and in a turn, no reply shows a quick restart."""
 PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.STILL: STILL,
     State.DRIVING: DRIVING,

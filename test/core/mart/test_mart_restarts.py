@@ -133,6 +133,24 @@ def test_motors_that_run_on_after_a_controlled_move_are_switched_off_before_the_
     assert not bench.server.manual
 
 
+@pytest.mark.parametrize("offset_s", [0.01 * step for step in range(0, 200, 8)])
+def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_s: float) -> None:
+    """The server restarts within 50 ms in a turn, so that no reply is missing.
+
+    The driver does not notice it. VOLTS would crash the server, with the motors on. So the driver
+    sends no VOLTS in turns on the spot, which do not need the voltage.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.0, 0.5, 2.0)
+    bench.run(offset_s % 0.1)
+    bench.command(0.0, 0.5, offset_s)
+    bench.server.restart(0.05)
+    bench.command(0.0, 0.5, 1.0)
+    bench.run(3.0)
+    assert not bench.server.crashed
+    assert bench.robot.stands
+
+
 def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
     """Return a bench whose server was restarted during a move, 8 s ago.
 
