@@ -207,7 +207,7 @@ class Hearing(Measuring):
             self.state = State.STILL
             self.imu.missed(now)
         elif word in (words.MCS, words.MSM):
-            if self._switch_off.missed(word):
+            if self._switch_off.missed(word, disturbed=self.conversation.disturbed(now)):
                 self._once(NO_MCS)
         elif word.kind is Kind.SERVICE:
             self.state = State.STILL

@@ -19,8 +19,13 @@ OFF: Final = MCS.request(128, 128)
 RELEASE: Final = MSM.request()
 """The request that ends the direct control of the motors by MCS. Without MCS, it does nothing."""
 
-MOST_MISSES: Final = 4
-"""Number of unanswered requests after which the driver no longer tries to switch off the motors."""
+MOST_MISSES, MOST_MISSES_DISTURBED = 4, 8
+"""Number of unanswered requests after which the driver no longer tries to switch off the motors.
+
+The limits are for a server that does not answer MCS. ``MOST_MISSES_DISTURBED`` applies to a network
+that loses other replies, too. If it loses one datagram of five, four exchanges in a row fail once
+in sixty times.
+"""
 NO_MCS: Final = (
     "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"
     " on after a straight move: if the robot creeps, send it a turn, or cut the motor power"
@@ -91,18 +96,19 @@ class SwitchOff:
             self._supported = True
         self.underway = word is MCS and self._supported
 
-    def missed(self, word: Word) -> bool:
+    def missed(self, word: Word, *, disturbed: bool = False) -> bool:
         """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
 
-        After MOST_MISSES unanswered requests in a row, the request is not repeated, and motions are
-        allowed again. If it was MCS, the driver does not use MCS until the next connection, or
-        until the motors may run on without a motion (``doubt``).
+        After MOST_MISSES unanswered requests in a row, or MOST_MISSES_DISTURBED in a ``disturbed``
+        network, the request is not repeated, and motions are allowed again. If it was MCS, the
+        driver does not use MCS until the next connection, or until the motors may run on without a
+        motion (``doubt``).
 
         The server may execute an unanswered MCS later, and then refuses the next motion. If this
         happens, the driver sends MSM, which ends the direct control by MCS.
         """
         self._misses += 1
-        if self._misses < MOST_MISSES:
+        if self._misses < (MOST_MISSES_DISTURBED if disturbed else MOST_MISSES):
             return False
         self.needed = self.underway = False
         self._misses = 0

@@ -7,6 +7,7 @@ MSM, which ends the direct control.
 """
 
 from collections.abc import Callable
+from itertools import count
 
 import pytest
 from mart_bench import MartBench
@@ -170,6 +171,27 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
     assert lost
     assert registers(bench) == OFF
     assert not bench.server.manual
+
+
+def test_four_lost_replies_on_a_poor_network_do_not_look_like_a_server_without_mcs() -> None:
+    """The network loses four exchanges of MCS in a row, and the replies to some queries.
+
+    The driver sends MCS once more, and then MSM. It does not report that the server has no MCS.
+    """
+    bench = creeping()
+    since, notices = len(bench.written), len(bench.notices)
+    counts = count()
+
+    def is_lost(data: bytes) -> bool:
+        if data == BOTH[0]:
+            return bench.said(since).count(BOTH[0]) <= 4
+        return data == b"ENC" and not next(counts) % 4
+
+    drops(bench.robot.network[0].to_board, is_lost)
+    bench.run(15.0)
+    assert bench.said(since) == [BOTH[0]] * 5 + [BOTH[1]]
+    assert registers(bench) == OFF
+    assert len(bench.notices) == notices
 
 
 @pytest.mark.parametrize("reply", [b"", b"fail", b"fail improper command format", b"unknown"])
