@@ -45,8 +45,11 @@ QUIET_S: Final = 0.5
 """Period, in s, with which the board sends its tick counts during a record, because it can miss
 encoder ticks while it sends. Not set if the user has set no period, which the tool could not
 restore."""
-OWN_PERIOD_S: Final = 0.4
-"""Period, in s, with which a board sends its tick counts after a boot."""
+RATE_SHOWN: Final = "Odometry rate (Hz)"
+"""Name in /diagnostics of the rate at which the board sends its ticks: "measured of expected".
+
+If the user has set no period, the driver has measured the expected rate too.
+"""
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
 UNRESTORED: Final = (
@@ -152,7 +155,7 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         1.0 / arguments.control_frequency,
         ticks,
         LEAST_DEAD_S,
-        sends_each_s=bench.robot.parameters["ticks_period"] or OWN_PERIOD_S,
+        sends_each_s=_sends_each_s(bench.robot),
     )
     quiet = {"ticks_period": QUIET_S} if bench.robot.parameters["ticks_period"] else {}
     bench.set({"drive_mode": "rpm", "record_samples": arguments.samples, **quiet})
@@ -186,6 +189,17 @@ def _found(bench: _Bench, arguments: argparse.Namespace, goals: Goals) -> list[W
         )
         for side in SIDES
     ]
+
+
+def _sends_each_s(robot: Any) -> float:
+    """Return the period with which the board sends its tick counts, in s."""
+    if period_s := robot.parameters["ticks_period"]:
+        return float(period_s)
+    with suppress(ValueError, ZeroDivisionError):
+        return 1.0 / float(robot.diagnosed(RATE_SHOWN).rpartition(" of ")[2])
+    raise ToolError(
+        "the driver does not report how often the board sends its tick counts; set `ticks_period`"
+    )
 
 
 def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loop:

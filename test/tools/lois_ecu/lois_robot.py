@@ -103,6 +103,11 @@ class SimulatedRobot:
     def restore_parameters(self, values: Mapping[str, Any]) -> None:
         self.set_parameters(values)
 
+    def diagnosed(self, key: str) -> str:
+        assert key == "Odometry rate (Hz)"
+        self.bench.run_until(lambda: bool(self._board.figures.rates_hz))
+        return f"nan of {self._board.figures.rates_hz['Odometry']:g}"
+
     def rest(self, seconds: float) -> None:
         self.bench.run(seconds)
 

@@ -93,6 +93,30 @@ def test_values_that_an_ended_measurement_leaves_are_told(
     assert robot.parameters["left_short_correction"] is not None
 
 
+@pytest.mark.parametrize(("set_s", "own_ms"), [(None, 200), (None, 400), (0.1, 400)])
+def test_the_gains_are_tuned_for_the_period_with_which_the_board_sends_its_ticks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_s: float | None, own_ms: int
+) -> None:
+    """While the board sends ticks, it measures the wheels late. So the tool needs the period.
+
+    If the user has set no period, the tool uses the one that the driver has measured.
+    """
+    periods_s: list[float] = []
+
+    def ends(*_arguments: object, sends_each_s: float) -> None:
+        periods_s.append(sends_each_s)
+        raise ToolError("seen")
+
+    monkeypatch.setattr(pi_step, "Loop", ends)
+    robot = SimulatedRobot(tmp_path, random_motors(5))
+    robot.board._timers[0x12].period_ms = own_ms
+    robot.set_parameters({"ticks_period": set_s})
+    robot.rest(4.0)
+    with pytest.raises(ToolError, match="seen"):
+        step.run(robot, Console(yes=True), command_line().parse_args(["step", "--yes"]))
+    assert periods_s == [pytest.approx(set_s or own_ms / 1000, rel=0.12)]
+
+
 def test_an_interrupted_measurement_restores_the_parameters(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
