@@ -174,7 +174,7 @@ class Sequence:
         """
         may_be_new, self._may_be_new, self.ambiguous = self._may_be_new, False, False
         if may_be_new and self._delta is not None:
-            self.ambiguous = abs(count * self._per_pose - self._delta) <= self._per_pose
+            self.ambiguous = self._from_zero(count, self._delta, now - self._pose_at)
         if self._reconnected:
             return Step(0)  # the next delta counts the losses from before and after this pose
         before, self._pose = self._pose, count
@@ -195,7 +195,7 @@ class Sequence:
         time_s = now - self._delta_at + self._period_s
         in_time = (self._told + missing) * self._period_s <= time_s
         delta = self._delta if self._ahead is None else self._ahead
-        from_zero = abs(count * self._per_pose - delta) <= self._per_pose
+        from_zero = self._from_zero(count, delta, elapsed_s)
         goes_on = passed == self._per_pose
         goes_on = goes_on or (in_time and missing * self._period_s > LONG_GAP_S)
         wrap = WRAP * self._per_pose
@@ -207,6 +207,17 @@ class Sequence:
             return Step(0)  # too little time has passed for these losses, or they are unknown
         self._told += missing
         return Step(missing)
+
+    def _from_zero(self, count: int, delta: int, elapsed_s: float) -> bool:
+        """Return whether the counters of a new pose and of the last delta fit a common zero.
+
+        ``elapsed_s``: time since the previous pose in s. If it is long enough, the counter of the
+        deltas may have wrapped since the zero.
+        """
+        passed = count * self._per_pose
+        wraps = max(0, round((passed - delta) / WRAP))
+        in_time = not wraps or passed * self._period_s <= elapsed_s + EARLY_S
+        return in_time and abs(passed - delta - wraps * WRAP) <= self._per_pose
 
     def _take_back(self, count: int, now: float) -> None:
         """Undo an assumed restart if ``count`` shows that the old counter has continued."""

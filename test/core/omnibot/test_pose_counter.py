@@ -99,6 +99,24 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(*, paused
     assert sequence.ambiguous
 
 
+@pytest.mark.parametrize(("uptime", "restarted"), [(217, True), (1241, False)])
+def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
+    uptime: int, restarted: bool
+) -> None:
+    """The board sends ``uptime`` deltas. In a gap of 12.4 s it restarts and sends 270 deltas.
+
+    By chance, the delta after the gap also continues the old counter. The counter of the next pose
+    begins at the same zero as that of the deltas, which has wrapped since then. After 217 deltas,
+    the pose shows the restart. After 1241, its counter continues the old one, too: it is ambiguous.
+    """
+    sequence = counted(uptime)
+    for count in range(270, 275):
+        step = sequence.delta(count % 256, (uptime + 39 + count) * 0.04)
+        assert not step.restarted
+    assert sequence.pose(54, (uptime + 39 + 274) * 0.04).restarted == restarted
+    assert sequence.ambiguous != restarted
+
+
 @pytest.mark.parametrize(("number", "restarted"), [(2, True), (51, False), (30, False)])
 def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_begins_anew(
     number: int, restarted: bool
