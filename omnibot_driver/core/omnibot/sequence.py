@@ -146,7 +146,11 @@ class Sequence:
         if 2 * latest_late_s > WRAP * period_s:
             self._pose = None  # the number of wraps is not known, so poses cannot be compared
         from_zero = count * period_s <= elapsed_s + EARLY_S
-        if lost and late_s > latest_late_s and (reconnected or from_zero):
+        if (
+            (lost or self._regular)  # without poses, nothing could disprove a restart
+            and late_s > latest_late_s
+            and (reconnected or from_zero)
+        ):
             self._renewed, self._left = True, (before, before_at, count)
             return Step(0, None, restarted=True)
         latest_s = (lost + 1) * period_s - (

@@ -117,6 +117,21 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
     assert sequence.ambiguous != restarted
 
 
+@pytest.mark.parametrize("restarted", [True, False])
+def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(restarted: bool) -> None:
+    """Nothing arrives for 4 s. Then the next count arrives.
+
+    The board may have restarted and counted up to it, so the driver supposes a restart. The counter
+    of the next pose shows it, too. Or the board stood still for 4 s, and its counters continue.
+    """
+    uptime = 331 if restarted else 30
+    sequence, first_s = counted(uptime), uptime * 0.04 + 4.0
+    steps = [sequence.delta((uptime + n) % 256, first_s + n * 0.04) for n in range(5)]
+    assert [step.restarted for step in steps] == [True, False, False, False, False]
+    pose = sequence.pose(15 if restarted else 6, first_s + 0.16)
+    assert pose.restarted == restarted
+
+
 @pytest.mark.parametrize(("number", "restarted"), [(2, True), (51, False), (30, False)])
 def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_begins_anew(
     number: int, restarted: bool

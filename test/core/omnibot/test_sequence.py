@@ -36,7 +36,8 @@ def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
     """The host hangs for up to 5 s. The next delta comes late, but its SEQ is the next one.
 
-    No delta is regarded as lost.
+    No delta is regarded as lost. The board sends no poses, so the driver supposes no restart, which
+    only a pose could disprove.
     """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
