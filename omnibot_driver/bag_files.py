@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Opens a rosbag2 with the library rosbags: its folder or one file, also after a killed recorder.
+"""Opens rosbag2 bags, also those of a recorder that was killed.
 
-This module knows files and messages; it does not know what is in a message.
+This module knows files and messages; it does not know the content of a message.
 """
 
 from collections.abc import Collection, Iterator

@@ -56,9 +56,9 @@ def names(path: Path) -> list[str]:
 
 
 def save(path: Path, values: Mapping[str, Any]) -> None:
-    """Write these values into the file, completely or not at all, and keep its other values.
+    """Write these values into the file, completely or not at all; keep its other values.
 
-    Comments are lost. A symbolic link is kept. Raises ParameterError if the old file is unreadable,
+    Comments are lost; a symbolic link is kept. Raises ParameterError if the old file is unreadable,
     and OSError if the new file cannot be written.
     """
     content = {**_read(path), **values}

@@ -2,9 +2,7 @@
 
 """Serialise measurements to CDR, the format of DDS messages, and parse velocity commands from CDR.
 
-CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write CDR quickly. At each
-start, ``difference`` compares the bytes from ``Serializer`` with the bytes that rclpy writes on
-this machine.
+CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write it quickly.
 """
 
 import itertools
@@ -107,9 +105,9 @@ class Serializer:
 
 
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
-    """Return the planar part of a serialised Twist, and whether all its other parts are zero.
+    """Return the planar part of a serialised Twist, and whether all other parts are zero.
 
-    Raises CommandRefused if a value is NaN or infinite, or if the bytes are not a Twist.
+    Raises CommandRefused for NaN or infinity, or if the bytes are not a Twist.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)

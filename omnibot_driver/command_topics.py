@@ -27,16 +27,13 @@ def obeying(
     ends_goal: Callable[[Any], bool] = lambda _message: False,
     moves_base: bool = True,
 ) -> Callable[[Any, MessageInfo], None]:
-    """Return a callback that passes each message to ``action``, with the session of the link.
-
-    A message that was in transit for too long is refused, unless ``may_be_old`` or ``is_stop``
-    returns True for it.
+    """Return a callback that passes each message to ``action``, and refuses old messages.
 
     * ``expires_s``: returns the age, in s, at which a command expires.
-    * ``may_be_old``: returns True for a message whose time in transit does not matter.
-    * ``is_stop``: returns True for a command to stop.
-    * ``ends_goal``: returns True for a command that ends a drive to a goal even if the command is
-      refused. May raise CommandRefused for an invalid message.
+    * ``may_be_old``: returns True for a message whose age does not matter.
+    * ``is_stop``: returns True for a command to stop; its age does not matter.
+    * ``ends_goal``: returns True for a command that ends a goal even if it is refused. May raise
+      CommandRefused for an invalid message.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()

@@ -2,9 +2,8 @@
 
 """The boards that the driver supports.
 
-Each board has a profile: a module that makes the objects for this board. A profile is imported only
-if the parameter ``board`` selects it. Outside the core and the profiles, the driver's code must
-work with any board.
+Each board has a profile, a module that is imported only if the parameter ``board`` selects it.
+Other modules outside the core must work with any board.
 """
 
 from collections.abc import Callable, Mapping
@@ -58,10 +57,10 @@ class Profile(Protocol):
         """Return the kinematics of the wheels, from checked parameter values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Create the board's own topics and services, and return its publishing functions.
+        """Create the board's own topics and services; return the publishing functions.
 
-        The result has a function for each type of reading that only this board has. The driver
-        calls this function once, on the executor's thread, before any bytes arrive.
+        The result has one function for each type of reading that only this board has. Called once,
+        on the executor's thread, before any bytes arrive.
         """
 
 
@@ -94,11 +93,10 @@ def table_for(given: Mapping[str, object]) -> Table:
 
 
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
-    """Return the values of all parameters of one board.
+    """Return the values of all parameters of the board that ``given`` names.
 
-    A parameter that is not in ``given`` has its default value. ``given`` also names the board.
-
-    Raises ParameterError if a value is wrong, or if the board does not have a given parameter.
+    A parameter that is not in ``given`` has its default value. Raises ParameterError for a wrong
+    value, or for a parameter that this board does not have.
     """
     table = table_for(given)
     for name in given:

@@ -2,8 +2,8 @@
 
 """The parameters that only a Fejemis has. This module must not use ROS.
 
-The robot's two boards, the Teensys, store some of these values. Such a parameter is unset by
-default, and the driver then writes no value to the boards (`fejemis_values.py`).
+The robot's two boards store some of these values. While such a parameter is unset (the default),
+the driver does not write it.
 """
 
 import math
@@ -12,8 +12,7 @@ from typing import Final
 from omnibot_driver.parameters import RANGE_TYPES, Parameter
 
 MOST_GAINS: Final = 17
-"""Largest number of values in ``steering_gains``. The command ``cpsteer`` asks the board for these
-values. The board's answer has the same number of values."""
+"""Largest number of values in ``steering_gains``: the board answers ``cpsteer`` with as many."""
 
 FRONT_PORT: Final = (
     Parameter(

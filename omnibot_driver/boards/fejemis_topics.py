@@ -39,7 +39,7 @@ WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns.
 
-The board sends 66 angles per second. The driver does not publish an angle that comes earlier.
+The board sends 66 angles per second; earlier angles are not published.
 """
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")
@@ -208,10 +208,9 @@ class FejemisTopics:
         return serve
 
     def _forget_bias(self, name: str) -> str:
-        """Set a bias of the driver to zero, because the board has just removed its own bias.
+        """Set the parameter ``name``, a bias, to zero after the board has removed its own bias.
 
-        ``name``: the parameter. Return a text about it for the answer, or an empty string if the
-        parameter was zero.
+        Return a remark for the service's answer; empty if the parameter was zero.
         """
         was_set = any(self._values[name])
         # Even if the parameter was zero: the driver may have refined the gyro's bias.
@@ -273,12 +272,11 @@ class FejemisTopics:
             self._warn(trouble)
 
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
-        """Call ``action``; return the reason if it was refused, or an empty string.
+        """Call ``action``; return the reason for a refusal, or an empty string.
 
-        ``what``: name of the topic or device, which the reason contains.
-
-        ``off``: whether the action switches something off. The boards' state never prevents such an
-        action. If a port is not open, the returned text says that the device may still be on.
+        * ``what``: name of the topic or device.
+        * ``off``: whether the action switches a device off. The boards' state never prevents it.
+          The result is then a warning if a port is not open.
         """
 
         def say(session: Session, now: float) -> str:
@@ -308,10 +306,7 @@ def _why_not_request(what: str, session: Session) -> str:
 
 
 def _why_not_off(what: str, session: Session) -> str:
-    """Return a warning that ``what`` may still be on after the command to switch it off.
-
-    The warning contains the reason: a port is not open. If all ports are open, the result is empty.
-    """
+    """Return a warning that ``what`` may still be on; empty if all ports are open."""
     why = NOT_CONNECTED if session.state == "disconnected" else session.interlocks.missing
     later = "; the driver switches it off again when all ports are open"
     return f"{what} may still be on: {why}{later}" if why else ""

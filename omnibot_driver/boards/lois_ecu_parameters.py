@@ -2,8 +2,8 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
-The board itself stores the values of some parameters. These parameters are unset by default. While
-such a parameter is unset, the driver does not write a value to the board.
+The board stores some of these values. While such a parameter is unset (the default), the driver
+does not write it.
 """
 
 from collections.abc import Mapping
@@ -17,8 +17,9 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz. In such a mode, the board forwards each
-command to a sensor over a slow line. The compass' line carries at most 34 commands a second."""
+"""Largest rate of commands in a terminal mode, in Hz. The board then forwards each command to a
+sensor; the compass' line carries at most 34 commands a second.
+"""
 
 WHEELS: Final = (
     Parameter(
@@ -267,7 +268,7 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the command rate would delay Stop in a terminal mode.
 
-    In such a mode, the board forwards each Stop to a sensor over a line with 4800 or 9600 baud.
+    The board then forwards each Stop to a sensor at 4800 or 9600 baud.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Services that start a record of the LOIS ECU, and answer when the record's file is written.
+"""Services that record readings of the LOIS ECU, and answer when the file is written.
 
-A record is a series of readings that the board takes. This module only connects ROS to the session.
+This module only connects ROS to the session.
 """
 
 import threading

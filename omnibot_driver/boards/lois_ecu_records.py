@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Saves a record of the LOIS ECU as a CSV file. The file is complete or does not exist.
+"""Saves a record of the LOIS ECU as a CSV file, completely or not at all.
 
-This module knows records and files; it knows neither ROS nor the board's lines.
+This module knows neither ROS nor the board's lines.
 """
 
 import csv
@@ -24,9 +24,10 @@ Row = tuple[object, ...]
 
 
 def table(reading: RecordReading) -> Iterator[Row]:
-    """Yield the header of the file, then one row for each sample; an unknown value is empty.
+    """Yield the header of the file, then one row for each sample.
 
-    Headings are in degrees, clockwise from magnetic north. The scale of the torques is unknown.
+    Headings are in degrees, clockwise from magnetic north. Torques have an unknown scale. An
+    unknown value is an empty string.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:

@@ -85,10 +85,10 @@ class LoisEcuTopics:
         self._make_what_the_modes_need()
 
     def _make_what_the_modes_need(self) -> None:
-        """Create and remove topics, as the parameters ``drive_mode`` and ``terminal_mode`` require.
+        """Create and remove topics for the parameters ``drive_mode`` and ``terminal_mode``.
 
-        ``duty_cmd`` exists only in duty mode. ``~/terminal`` is created in a terminal mode, and
-        then stays. This method must be called on the executor's thread.
+        ``duty_cmd`` exists only in duty mode; ``~/terminal`` stays after its first use. Call this
+        method on the executor's thread.
         """
         duty, terminal = (
             self._values["drive_mode"] == "duty",

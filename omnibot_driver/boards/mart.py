@@ -21,8 +21,7 @@ SIMULATOR: Final = "omnibot_driver.simulator.mart"
 def refuse_recordings(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the port is a recording.
 
-    The controller sends only replies, and a reply does not name its request. So the replies alone
-    show neither the motion nor the odometry.
+    A recorded reply does not name its request, so a recording does not show the odometry.
     """
     if is_recording(values["port"]):
         raise ParameterError(

@@ -1,24 +1,25 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Decides when the controller's clock may be set with the command TIME, and with which arguments.
+"""Decides when, and with which arguments, the command TIME may set the controller's clock.
 
-TIME sets the clock to a full minute, and ignores the seconds. If the clock is set back between two
-motions, the controller computes a wrong heading. This module knows times only.
+TIME sets a full minute and ignores the seconds. If it sets the clock back between two motions, the
+controller computes a wrong heading.
 """
 
 import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds near the end of a minute. In these seconds, the driver sends TIME with the next full
-minute. The controller's clock is then at most 4 s fast."""
+"""Seconds near the end of a minute in which the driver sends TIME with the next full minute. The
+controller's clock is then at most 4 s fast.
+"""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second (UTC) for TIME, or None if TIME must wait.
 
-    TIME is the command that sets the controller's clock. ``now_s``: present time in s since 1970.
-    ``may_set_back``: whether TIME may set the clock back.
+    * ``now_s``: present time in s since 1970.
+    * ``may_set_back``: whether TIME may set the controller's clock back.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -139,10 +139,10 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if goal poses are used and the axis signs contradict each other.
+    """Raise ParameterError if the axis signs do not permit goal poses.
 
-    The sign of yaw must be the product of the signs of x and y. Otherwise the board's axes would be
-    a mirror image of the robot's axes.
+    The sign of yaw must be the product of the signs of x and y; otherwise the board's axes are a
+    mirror image of the robot's.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

@@ -2,6 +2,5 @@
 
 """The core of the driver: it converts bytes and times into values.
 
-It does no input or output, and knows neither ROS nor threads nor clocks. Each board has its own
-package here.
+The core has no input or output, and uses no ROS, threads or clocks. Each board has its own package.
 """

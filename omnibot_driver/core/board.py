@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The interface between the driver and a motor board: what to implement to add a board.
+"""The interface that a new board must implement.
 
-A ``Board`` does not know ROS or ports, and reads no clock: every ``now`` is the host's steady time,
+A ``Board`` does not know ROS or ports, and reads no clock. Every ``now`` is the host's steady time,
 in s.
 """
 
@@ -40,15 +40,14 @@ RateName = Literal["IMU", "Odometry", "Pose"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardFigures:
-    """Counters and states of a board for the diagnostics, counted over all connections.
+    """Figures of a board for the diagnostics. Counters continue over all connections.
 
     * ``rates_hz``: expected rate of each kind of reading.
     * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
-    * ``faults``: number of framing faults. At a framing fault, bytes belong to no frame.
+    * ``faults``: number of framing faults.
     * ``discarded_bytes``: number of bytes that belong to no valid frame.
     * ``saturated``: number of commands that exceeded the range of the board's encoding.
-    * ``odom_hz``: rate of the topic ``odom``. If None, one message is published per odometry
-      reading.
+    * ``odom_hz``: rate of the topic ``odom``; None: one message for each odometry reading.
     * ``own``: figures that only this kind of board has, by label, e.g. its version.
     """
 
@@ -76,31 +75,31 @@ class ReadingClock(Protocol):
     ) -> list[float]:
         """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
-        ``now``: the time that was passed to this call. ``edge``: the value of ``Board.edge`` after
-        this call.
+        * ``now``: time that was passed to that call.
+        * ``edge``: value of ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a reading that arrived alone. This is faster than ``stamps``.
+        """Return the stamp of a reading that arrived alone; faster than ``stamps``.
 
-        If the stamp is uncertain, return None and change nothing. The caller must then use
-        ``stamps`` instead.
+        If the stamp is uncertain, return None and change nothing; then call ``stamps``.
         """
 
 
 class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
-    Methods with only a docstring must be implemented. Requests such as ``pause`` raise
-    RequestRefused if the present mode forbids them.
+    Implement each method that has only a docstring. Requests such as ``pause`` raise RequestRefused
+    if the present mode forbids them.
     """
 
     traits: Traits
     """Capabilities of this kind of board."""
 
     settings: Any
-    """Settings of this board that its data does not show. The driver can replace this object at any
-    time."""
+    """Settings of this board that its data does not show. The driver can replace the object at any
+    time.
+    """
 
     clock: ReadingClock | None = None
     """Clock for readings that carry the board's time.
@@ -114,9 +113,9 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Position, in the stream of IMU samples, of the last byte that the last read brought.
+        """Position of the last received byte in the stream of IMU samples.
 
-        None if this position is uncertain or has not changed.
+        None if the position is uncertain or has not changed.
         """
         return None
 
@@ -164,12 +163,10 @@ class Board(Protocol):
         """Begin a new connection: forget the mode, and everything from the old connection."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
+        """Decode bytes, update ``mode``, and return the readings in order.
 
-        If only later bytes can prove that a reading is correct, the call with those bytes returns
-        it.
-
-        ``now``: time of arrival.
+        If later bytes must prove a reading, the call with those bytes returns it. ``now``: time of
+        arrival.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -177,10 +174,9 @@ class Board(Protocol):
         return []
 
     def discard(self) -> None:
-        """Discard the bytes that are held for decoding, because a long silence has followed them.
+        """Discard incomplete data, because a long silence has followed.
 
-        Otherwise, the bytes after the silence might complete a reading. The driver would give this
-        reading the arrival time of the later bytes, which is wrong.
+        If later bytes completed such a reading, the reading would get a wrong arrival time.
         """
         return
 
@@ -188,9 +184,9 @@ class Board(Protocol):
         """Forget the mode, because the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """Record that this process stalled, so its guard process may have sent ``last_words``.
+        """Record that this process stalled, so its guard may have sent ``last_words``.
 
-        These packets stop the robot. They may also have switched off another motor, e.g. a brush.
+        ``last_words`` may also have switched off another motor, e.g. a brush.
         """
         return
 
@@ -200,18 +196,17 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the packets that must be sent now to subscribe, to poll or to relay values.
+        """Return the packets to write now: subscriptions, polls and relayed values.
 
-        They command no motion, and the driver always writes them. It calls this method at
-        ``wake_at``.
+        The packets command no motion, and are always written. Called at ``wake_at``.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        The list can contain OdometryReadings, NoticeReadings and results of requests. The board may
-        be silent meanwhile, so such readings do not show that the board is alive.
+        They may be OdometryReadings, NoticeReadings and results of requests. Such readings do not
+        show that the board is alive.
         """
         return []
 
@@ -242,8 +237,8 @@ class Board(Protocol):
     def start_requested(self) -> None:
         """Record that the user has requested a start.
 
-        If the board can be started, the driver then calls ``start``. The driver does not call this
-        method for its own starts, for example after a reconnect.
+        A call of ``start`` follows if the board can be started. The driver's own starts, e.g. after
+        a reconnect, do not call this method.
         """
         return
 
@@ -254,15 +249,14 @@ class Board(Protocol):
     def pause(self) -> Packets:
         """Return the packets that pause a running board.
 
-        On some boards, the same command resumes a paused board. For such a board, this method
-        raises RequestRefused unless the board is known to run.
+        Raises RequestRefused if the same packets might resume a paused board.
         """
         return NO_PACKETS
 
     def force_pause(self) -> Packets:
         """Return packets that pause the board in any mode.
 
-        They must also work if commands that were sent earlier arrive after them.
+        The packets must also work if earlier commands arrive after them.
         """
         return NO_PACKETS
 
@@ -292,10 +286,10 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two sets of packets; the guard process sends one of them if this process hangs.
+        """Return the guard's packets for a hang of this process: without and with a latched e-stop.
 
-        The first contains Stop. The second is for a latched e-stop, and contains the emergency
-        stop, then Stop. The driver calls this method after each input and before each output.
+        The first item contains Stop; the second contains the emergency stop, then Stop. Called
+        after each input and before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

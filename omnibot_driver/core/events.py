@@ -28,9 +28,8 @@ class Notice:
 class Extra:
     """A measurement that only one kind of board makes; its profile publishes it.
 
-    If ``value`` is a RequestDone or Unstamped, it is published without a stamp.
-
-    * ``stamp_s``: time of measurement, in s of the host's steady clock.
+    ``stamp_s``: time of measurement, in s of the host's steady clock; not used for a RequestDone or
+    Unstamped.
     """
 
     value: object

@@ -1,10 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The inbound path turns bytes from the board into measurements and events.
+"""The inbound path turns bytes from the board, or elapsed time, into measurements and events.
 
-Some measurements and events follow from elapsed time alone. This module knows the board, the
-measurements and the safety stops. It does not know what the bytes mean, or which motion is
-commanded.
+This module does not know what the bytes mean, or which motion is commanded.
 """
 
 from collections.abc import Sequence
@@ -54,9 +52,8 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        If the bytes change the mode of the board, ``hear`` also calls ``process`` itself, so that
-        the change takes effect before the next command. In this case, the estimates are added to
-        the reporter's events, and the result is empty.
+        If the bytes change the mode of the board, ``hear`` also calls ``process``. The estimates
+        are then among the reporter's events, and the result is empty.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -128,8 +125,8 @@ class Inbound:
 def _show_life(readings: Sequence[Reading]) -> bool:
     """Return whether readings that came without new bytes show that the board is alive.
 
-    OdometryReadings, NoticeReadings and results of requests can follow from elapsed time alone, so
-    they are ignored. Any other reading shows that the board is alive.
+    OdometryReadings, NoticeReadings and results of requests do not: they can follow from elapsed
+    time alone.
     """
     for reading in readings:
         content = reading.content if isinstance(reading, ExtraReading) else reading

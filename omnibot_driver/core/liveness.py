@@ -2,7 +2,6 @@
 
 """Liveness of the board: when it last sent data, and whether its silence is too long.
 
-This module knows times and limits. It does not know what the data means, or how the driver reacts.
 Time is an argument.
 """
 
@@ -14,8 +13,8 @@ from omnibot_driver.core.traits import Traits
 class Liveness:
     """The times at which a board last sent data, and the limits for its silence.
 
-    * ``heard_at``: arrival of the last reading, in s. The start of a connection and the end of a
-      stall also count as an arrival.
+    * ``heard_at``: arrival of the last reading, in s; also the start of a connection, or the end of
+      a stall.
     * ``came_at``: arrival of the last bytes, valid or not, in s.
     """
 
@@ -23,8 +22,9 @@ class Liveness:
         self.unheard_s, self.silence_s = traits.unheard_s, traits.silence_s
         self.heard_at = self.came_at = -math.inf
         self._silent_since: float | None = None
-        """The value that ``heard_at`` had when a silence was last reported. While ``heard_at``
-        still has this value, the same silence continues, so it is not reported again."""
+        """Value of ``heard_at`` when a silence was last reported. The same value means the same
+        silence, which is reported only once.
+        """
 
     def begin(self, now: float) -> None:
         """Begin a new connection."""
@@ -34,8 +34,7 @@ class Liveness:
     def stalled(self, now: float) -> None:
         """Measure the board's silence from ``now`` on, because this process has stalled until now.
 
-        During the stall, the driver could not receive, so it does not know whether the board sent
-        data. A silence that was reported before the stall is not reported again.
+        A silence that was reported before the stall is not reported again.
         """
         if self._silent_since == self.heard_at:
             self._silent_since = now
@@ -48,8 +47,7 @@ class Liveness:
     def is_silent(self, now: float) -> bool:
         """Return whether the board is silent.
 
-        It is silent if no bytes have arrived since the port was opened. It is also silent if
-        ``Traits.silence_s`` or more have passed since the arrival of the last reading.
+        Silent means: no bytes since the port was opened, or no reading for ``Traits.silence_s``.
         """
         return self.came_at == -math.inf or now - self.heard_at >= self.silence_s
 

@@ -2,9 +2,8 @@
 
 """The interface between the command policy and a board's encoding of motion.
 
-The command policy decides what the robot should do; an actuator makes the packets for it. On some
-boards, the actuator sends each set-point repeatedly (`set_point_stream.py`). An actuator reads no
-clock, and never refuses what the command policy orders.
+An actuator turns the policy's decision into packets, and may repeat them (`set_point_stream.py`).
+An actuator reads no clock and refuses no order.
 """
 
 from typing import Protocol
@@ -28,10 +27,9 @@ class Actuator(Protocol):
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """Body velocity of the last command that was sent, in the board's axes.
+        """Body velocity of the last sent command, as the board rounds it, in the board's axes.
 
-        It is the velocity after the board's encoding has rounded it. None after a command that
-        determines no velocity, such as a goal.
+        None after a command that determines no velocity, such as a goal.
         """
 
     @property

@@ -2,9 +2,8 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method ``why_not_…`` returns the reason for a refusal, as a sentence with a remedy, or an
-empty string if there is no reason. This module knows the board's mode, and whether a request is in
-progress.
+Each method ``why_not_…`` returns the reason for a refusal, as a sentence with a remedy; empty if
+there is none.
 """
 
 from typing import Final
@@ -24,7 +23,7 @@ NO_VALID_DATA: Final = "no valid data from the board; check its power and cable,
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    * ``leaving``: whether the driver is shutting down. If so, everything is refused.
+    * ``leaving``: whether the driver is shutting down and refuses everything.
     * ``missing``: which lines are not open, as a sentence; empty if none.
     """
 
@@ -47,19 +46,17 @@ class Interlocks:
         return "the driver is shutting down; start it again" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, by this class or by another one.
+        """Record that a motion command was refused, by this class or elsewhere.
 
-        Call this method for every refused command. After a first stop by the motion monitor, motion
-        is refused until no command has arrived for some time. Each refused command restarts this
-        time, because its sender is still active.
+        Call this method for every refused command. After the motion monitor's first stop, motion is
+        allowed again only when commands have ceased for some time, which begins again here.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.
 
-        Call this method only once for each command, because it records each call as the arrival of
-        a command.
+        Call this method once for each command: each call records the arrival of a command.
         """
         if self.leaving or self.missing:
             return self.why_not_request()
@@ -86,15 +83,15 @@ class Interlocks:
     def why_not_move_by_itself(self, now: float) -> str:
         """Return why a service must not move the robot, e.g. to dock it; empty if it may.
 
-        The motion monitor's refusal holds for such a motion, as for motion commands.
+        The refusals of the motion monitor apply to such motions too.
         """
         return self._interlock.reason(now, self._policy.settings.timeout_s)
 
     def why_not_reset_odometry(self, now: float) -> str:
         """Return the reason why the odometry cannot be reset; empty if it can.
 
-        While the board is silent, a reset is refused, because the next data could contain motion
-        from before the reset. This motion would wrongly be added to the new pose.
+        While the board is silent, a reset is refused: later data could contain motion from before
+        the reset.
         """
         if self._mode_manager.phase is Phase.CLOSED:
             return NOT_OPEN

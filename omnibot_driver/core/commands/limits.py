@@ -2,8 +2,7 @@
 
 """Speed limits for commands. They never change the direction of the linear velocity.
 
-Call ``require_finite`` first. It rejects NaN and infinity, which the other functions must not get.
-Only ``SpeedLimits.allow`` may get them, too.
+Call ``require_finite`` first: except ``SpeedLimits.allow``, no function accepts NaN or infinity.
 """
 
 import math
@@ -19,6 +18,7 @@ class SpeedLimits:
     """The largest speeds and accelerations that are commanded.
 
     * ``linear_mps``: length of the linear velocity, in m/s.
+    * ``angular_radps``: yaw rate, in rad/s.
     * ``wheel_radps``: rate of the fastest wheel, in rad/s.
     * ``linear_mps2``, ``angular_radps2``: accelerations in m/s² and rad/s²; 0: unlimited.
     """
@@ -54,8 +54,7 @@ class SpeedLimits:
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
         """Return the twist that a ramp from ``now`` to ``wanted`` reaches in ``duration_s``.
 
-        The accelerations are limited. The linear velocity changes along a straight line. The yaw
-        rate changes independently of it.
+        The linear velocity changes along a straight line, independently of the yaw rate.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),

@@ -2,8 +2,7 @@
 
 """The motion interlock: refuses motion after the motion monitor has stopped the robot.
 
-In this module, a stop is a stop by the motion monitor. The module knows when commands and stops
-happened. It does not know the reason for a stop, nor what is commanded. Time is an argument.
+In this module, a stop is always a stop by the motion monitor. Time is an argument.
 """
 
 import math
@@ -11,8 +10,9 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Two stops by the motion monitor within this time, in s, are assumed to have the same cause. After
-the second stop, the user must act before motion is accepted again."""
+"""Two stops within this time, in s, are assumed to have the same cause. The user must then act
+before motion is accepted again.
+"""
 
 
 class Until(Enum):
@@ -57,9 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        After the monitor's first stop, the release changes nothing. After its second stop within
-        60 s, the release allows motion again if the board has no ~/start; otherwise, only ~/start
-        allows it.
+        After the monitor's second stop within 60 s, the release allows motion again if the board
+        has no ~/start. In all other cases, the release changes nothing.
         """
         if self.until is Until.ESTOP:
             self.start()
@@ -70,17 +69,13 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Let the required time without commands begin again, if motion is still refused.
+        """Restart the waiting time after a first stop by the monitor.
 
-        After a first stop by the monitor, motion is refused until no command has arrived for
-        ``timeout_s``. This method lets that time begin again at ``now``.
+        Motion is refused until no command has arrived for ``timeout_s``. Call this method in two
+        cases:
 
-        Call this method in two cases:
-
-        * A command was refused. Its sender is still active.
-        * This process has stalled. Commands may have arrived unnoticed.
-
-        ``stalled_s``: length of the stall in s, which does not count as time without commands.
+        * A command was refused: its sender is still active.
+        * This process has stalled for ``stalled_s``: commands may have arrived unnoticed.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now
@@ -88,11 +83,8 @@ class MotionInterlock:
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        ``stands``: whether the command is to stand still. Such a command is always allowed.
-
-        ``timeout_s``: after a first stop by the motion monitor, motion is allowed again when no
-        command has arrived for this time in s. After a second stop within 60 s, motion remains
-        refused.
+        * ``timeout_s``: time in s without commands that ends the refusal after a first stop.
+        * ``stands``: whether the command is a standstill, which is always allowed.
         """
         reason = "" if stands else self.reason(now, timeout_s)
         if not stands:

@@ -2,8 +2,8 @@
 
 """The command pipeline: from a motion command to its set-point, expiry and supervision.
 
-This module connects the parts. It does not know modes or requests: ``interlocks.py`` decides
-whether a robot may be driven now.
+``interlocks.py`` decides whether the robot may be driven; this module does not know modes or
+requests.
 """
 
 import math
@@ -44,7 +44,7 @@ class CommandPipeline:
     * ``policy``: the command in effect, its expiry and the e-stop latch.
     * ``interlock``: refuses motion after the motion monitor has stopped the robot.
     * ``monitored``: whether the motion monitor is enabled.
-    * ``obeys``: False if the session replays a recording, which cannot follow commands.
+    * ``obeys``: False if the session replays a recording.
     """
 
     def __init__(
@@ -80,8 +80,7 @@ class CommandPipeline:
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
         """Apply new settings to later commands and frames; return notices for the user.
 
-        If a limit or the timeout becomes stricter, a motion in progress is stopped. A drive to a
-        goal continues.
+        A stricter limit or timeout stops a motion in progress, except a drive to a goal.
         """
         if settings.motion_monitor is not self.monitored:
             self.monitored = settings.motion_monitor
@@ -103,11 +102,8 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        The robot is stopped in two cases:
-
-        * The command cannot be encoded with the new settings.
-        * The command was a standstill, but is a motion with the new settings. It was never checked
-          as a motion.
+        The robot is stopped if the command cannot be encoded any more, or if a standstill has
+        become a motion, which was never checked.
         """
         current = self.policy.current
         if current is None:
@@ -152,11 +148,8 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity.
 
-        Raises CommandRefused if the velocity is not allowed, or if the sender's stamp is too old or
-        too far in the future.
-
-        ``age_s``: age of the sender's stamp in s. The time until the command expires is shorter by
-        this age.
+        ``age_s``: age of the sender's stamp in s; the command expires earlier by this age. Raises
+        CommandRefused if the velocity is not allowed, or if the stamp is too old or in the future.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -179,10 +172,7 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Tell the motion monitor which set-point the robot should follow from ``now`` on.
-
-        The set-point is the one that was sent last, or None during a drive to a goal.
-        """
+        """Tell the motion monitor the last sent set-point; None during a drive to a goal."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -197,9 +187,8 @@ class CommandPipeline:
     def count_refused(self, count: int, now: float) -> list[str]:
         """React to rejected displacements; return notices for the user.
 
-        Several rejected displacements in a row show that the robot does not move as commanded.
-
-        ``count``: number of displacements that were rejected since the driver began.
+        Several in a row show that the robot does not move as commanded. ``count``: number of
+        displacements that were rejected since the driver began.
         """
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
@@ -211,8 +200,7 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The newest estimate gives the motion. If there is no estimate, or if the newest estimate has
-        no motion, ``reading`` gives the motion.
+        The motion comes from the newest estimate, or from ``reading`` if that estimate has none.
         """
         if not reading.possible:
             return self._monitor.count_impossible(now)
@@ -267,8 +255,8 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only the loss of a goal gives a notice. Velocity commands come repeatedly, so the driver
-        refuses the next one, and reports this.
+        Only the loss of a goal gives a notice: velocity commands are repeated, and the next one is
+        refused with a notice.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
@@ -282,8 +270,8 @@ class CommandPipeline:
     def end_goal(self, now: float) -> list[str]:
         """Drop the goal or the docking, because of a zero ``cmd_vel``; return notices for the user.
 
-        The zero ``cmd_vel`` was refused, but it still ends this motion. There is one exception: the
-        goal stays if the board's control switch does not permit velocities at all.
+        The zero ``cmd_vel`` was refused, but still ends the motion. A goal stays if the board's
+        control switch does not permit velocities.
         """
         goal = isinstance(self.policy.current, GoalSetpoint)
         motion = "goal" if goal else self._board.own_motion

@@ -2,9 +2,8 @@
 
 """The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-A board continues the last motion until it receives Stop. So the driver must send Stop when a
-command expires. This module knows commands and times; it does not know how Stop is encoded, and
-reads no clock.
+A board continues the last motion until it receives Stop, so an expired command needs a Stop. This
+module reads no clock.
 """
 
 import math
@@ -18,8 +17,9 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.05
-"""Shortest time in s for which Stop is repeated. ``SetpointStream`` sends successive Stops at most
-0.05 s apart, so the last one is sent at least 1 s after the first one."""
+"""Shortest time in s for which Stop is repeated: at a spacing of at most 0.05 s, the last Stop is
+sent at least 1 s after the first.
+"""
 UNPROVED_S: Final = 5.0
 """Longest time, in s, for which Stop is repeated without proof that the robot stands still."""
 ROUNDING_S: Final = 1e-6
@@ -53,8 +53,7 @@ class CommandPolicy:
         """Command in effect, or None."""
         self.commanded_at = -math.inf
         self.quiet = False
-        """Whether the policy sends nothing, because it waits for the proof that the robot obeyed
-        the last Stop."""
+        """Whether the policy sends nothing while it waits for the proof of the last Stop."""
         self.unconfirmed = False
         """Whether the repetition of Stop has ended without proof that the robot stands still."""
         self._expires_at = -math.inf
@@ -94,9 +93,8 @@ class CommandPolicy:
     def halt(self, now: float) -> None:
         """Drop the current command, and repeat Stop until a standstill is proved.
 
-        Stop is repeated for at least ``STOPPING_S``. If no proof arrives, the repetition ends after
-        ``UNPROVED_S``. If the e-stop is latched, the emergency stop is repeated until ``release``
-        is called.
+        * The repetition lasts at least ``STOPPING_S``, and without proof at most ``UNPROVED_S``.
+        * While the e-stop is latched, the emergency stop is repeated instead, until ``release``.
         """
         self.current = None
         self.quiet = False

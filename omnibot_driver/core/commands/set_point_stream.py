@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An actuator for boards that follow set-points: it decides which frame is sent when.
+"""An actuator that decides which set-point frame is sent when.
 
-These boards do not acknowledge frames, so frames are repeated. This module knows orders and times;
-it does not know what is in a frame, and reads no clock.
+Boards that follow set-points do not acknowledge frames, so frames are repeated. This module does
+not know the content of a frame, and reads no clock.
 """
 
 import math
@@ -20,11 +20,10 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 PACE_S: Final = 0.01
 """Shortest time between frames, in s. More frequent frames would only fill a buffer."""
 MOTION_PACE_S: Final = 0.018
-"""Shortest time between two set-points, in s. It is short enough for commands at 50 Hz.
+"""Shortest time between two set-points, in s; short enough for commands at 50 Hz.
 
-On a line that loses bytes, a shorter time would do harm: more set-points would be sent, so more
-would be damaged, and the board would obey wrong ones for a larger part of the time
-(docs/internals/integrity.md).
+On a line that loses bytes, more frequent set-points would be obeyed wrongly for a larger part of
+the time (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest rate at which Stop and the emergency stop are repeated, in Hz."""
@@ -52,9 +51,8 @@ class Encoder(Protocol):
 class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
-    * ``proof``: object to which each sent stop and each sent motion is reported.
-    * ``heard``: function that is called after each write, with the written packets and the time. It
-      is called for set-points and for the packets of requests.
+    * ``proof``: object to which each sent stop and motion is reported.
+    * ``heard``: called with the packets and the time after each write, also of requests.
     """
 
     def __init__(
@@ -105,11 +103,11 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        The set-point in effect is sent again at once:
+        The set-point in effect is then sent again at once:
 
-        * After Stop, because Stop has ended the motion. A zero set-point is not sent again.
-        * After other packets, because the last bytes of an earlier motion frame may be lost. The
-          board then takes the first bytes of the packets for them, and obeys a wrong motion.
+        * After Stop, unless the set-point is zero: Stop has ended the motion.
+        * After other packets, because the board may complete a damaged motion frame with their
+          first bytes, and obey a wrong motion.
         """
         if self._heard is not None:
             self._heard(packets, now)

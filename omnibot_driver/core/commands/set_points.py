@@ -16,21 +16,20 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
-"""Longest time in s by which one call of ``order`` advances a ramp. If more time has passed since
-the last call, the ramp is still advanced by this time only."""
+"""Longest time in s by which one call of ``order`` advances a ramp."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
 """``LEAVING_M``, ``LEAVING_RAD``: limits in m and rad. If the distance or the angle to the goal
-grows by more than its limit, the robot drives away from the goal. The overshoot of a controller is
-always below these limits."""
+grows by more, the robot drives away from the goal. The overshoot of a controller is always smaller.
+"""
 
 
 class Authority(Enum):
-    """The common topics that can command the robot, by name. The newest command is in effect.
+    """The common topics that can command the robot. The newest command is in effect.
 
-    A topic that only one board has is a member of an ``Enum`` of that board.
+    A topic that only one board has is a member of that board's own ``Enum``.
     """
 
     BASE = "cmd_vel"
@@ -67,11 +66,11 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * The attribute ``is_zero``: whether the order makes the robot stand still.
-    * The argument ``is_zero``: function that returns whether an order makes the robot stand still.
-      It raises CommandRefused if the order cannot be encoded.
-    * ``before``: the previous set-point. If it is a body velocity, the new ramp starts at the
-      velocity that the previous ramp has reached. Otherwise, the new ramp starts at rest.
+    * The attribute ``is_zero``: whether the command is a standstill.
+    * The argument ``is_zero``: returns whether an order is a standstill. Raises CommandRefused if
+      the order cannot be encoded.
+    * ``before``: previous set-point. The ramp starts at its present velocity, or at rest if it is
+      not a body velocity.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 
@@ -120,9 +119,9 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    * The attribute ``is_zero``: whether the order makes the robot stand still.
-    * The argument ``is_zero``: function that returns whether an order makes the robot stand still.
-      It raises CommandRefused if the order cannot be encoded.
+    * The attribute ``is_zero``: whether the command is a standstill.
+    * The argument ``is_zero``: returns whether an order is a standstill. Raises CommandRefused if
+      the order cannot be encoded.
     """
 
     settled: Final = True
@@ -147,11 +146,9 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: value of ``Odometry.alignments`` at the time of the command. If
-      ``Odometry.alignments`` has changed since then, the relation of the two frames has changed, so
+    * ``alignment``: ``Odometry.alignments`` at the time of the command. If it has changed,
       ``place`` is wrong, and the goal is discarded.
-    * ``check``: function that raises CommandRefused if the order to drive to ``place`` cannot be
-      encoded.
+    * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """
 

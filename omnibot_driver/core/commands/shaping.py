@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command shaping: turns a caller's command into a set-point in the board's axes and frame.
+"""Command shaping: checks and limits a command, and turns it into a set-point for the board.
 
-Commands are checked and limited here. This module knows the limits and the control switch; it does
-not know when anything is sent.
+The set-point is in the board's axes and frame. This module does not know when anything is sent.
 """
 
 from collections.abc import Sequence
@@ -34,8 +33,7 @@ class CommandShaper:
     """The checks and limits of motion commands. Every method may raise CommandRefused.
 
     * ``limits``, ``kinematics``: may be replaced at any time.
-    * ``control``: the control method for which the switch on the board is set. None if the board
-      has no such switch.
+    * ``control``: position of the control switch on the board; None if there is no switch.
     """
 
     def __init__(

@@ -2,8 +2,7 @@
 
 """The stop proof: whether displacements show that the robot stands still after the last Stop.
 
-Boards do not acknowledge a stop. This module knows displacements and sent orders. It does not know
-what the driver does if no proof comes. Time is an argument.
+Boards do not acknowledge a stop. Time is an argument.
 """
 
 import math
@@ -38,8 +37,7 @@ PROOFS: Final = 2.0
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-The driver uses the duration of the newest displacement as the period. After a loss, this duration
-also includes the lost displacements, so it is limited to ``RAREST_S``.
+After a loss, a displacement also spans the lost ones, so its duration is not the period.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
@@ -49,12 +47,10 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    ``proved``: whether a standstill is proved: the robot stood still for ``still_s`` after Stop, or
-    the board paused. A motion command, a measured motion or ``begin`` ends the proof.
-
-    ``owed``: whether a motion command was sent, and no standstill has been proved since then.
-
-    ``measured``: whether a measured displacement has arrived later than ``UNDER_WAY_S`` after Stop.
+    * ``proved``: whether the robot stood still for ``still_s`` after Stop, or the board paused. A
+      motion command, a measured motion or ``begin`` ends the proof.
+    * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
+    * ``measured``: whether a measured displacement arrived later than ``UNDER_WAY_S`` after Stop.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

@@ -2,10 +2,8 @@
 
 """Sends the motion lines (``rc``) to both boards, and repeats them.
 
-If the front wheel's angle limits the speed, or if the lines have no checksum, the lines are also
-repeated after each new measured angle.
-
-The module knows when a line is due; it does not know what the line contains.
+The lines are also repeated after each new angle of the front wheel if they depend on this angle, or
+if they have no checksum.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 """Writes the front wheel's angle as a line in which the drive board can detect damage.
 
-The board must never read an angle above 90°. At such an angle, it would drive its inner wheel
-faster than the outer one.
+At a misread angle above 90°, the board would drive its inner wheel faster than the outer one.
 """
 
 import math
@@ -22,11 +21,10 @@ MOST_OWED: Final = 0.5
 """Largest rounding error, in degrees, that is carried over to the next angle."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit in degrees for an angle that the board misreads.
+"""Limit in degrees for a misread angle.
 
-If damage on the line removes the minus sign of an angle, the checksum may not detect this, and the
-board reads an angle to the right as an angle to the left. The driver writes each angle so that a
-misread angle is below this limit.
+A checksum may not detect that an angle has lost its minus sign; the board then reads an angle to
+the right as an angle to the left. The driver keeps such an angle below this limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -54,8 +52,7 @@ class AngleRelay:
 def heard_instead(text: str) -> Iterator[float]:
     """Yield each number that a board may read if two characters of ``text`` are lost unnoticed.
 
-    The checksum does not detect the loss of some pairs of characters. Each of these pairs gives one
-    number: the one that the remaining characters form, or 0 if they form none.
+    The checksum misses some pairs of characters. The number is 0 if the other characters form none.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:

@@ -2,8 +2,7 @@
 
 """The Fejemis as a ``Board`` of the driver: its two Teensy boards appear as one robot.
 
-This module connects the other modules of ``core/fejemis``. It also composes the text lines that
-stop, start and pause the robot.
+This module composes the text lines that stop, start and pause the robot.
 """
 
 import math
@@ -34,9 +33,8 @@ from omnibot_driver.core.traits import Traits
 class FejemisBoard(Board):
     """A Fejemis robot as a ``Board``, the driver's interface to every robot.
 
-    ``services``: the user's requests that only a Fejemis has, such as brush and lift.
-
-    ``settings``: the settings in use. The caller may replace them at any time.
+    * ``services``: the requests that only a Fejemis has, such as brush and lift.
+    * ``settings``: may be replaced at any time.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -233,10 +231,10 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Latch or release the board's e-stop, because the driver has a new order for the robot.
+        """Latch or release the board's e-stop after a new order of the driver.
 
         ``estop``: whether the order is an emergency stop, which latches the e-stop. Any other order
-        releases the e-stop.
+        releases it.
         """
         if not estop:
             self._obedience.release(self._now)
@@ -308,11 +306,10 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the packets that the guard sends if the driver fails.
+        """Return the packets that the guard sends if the driver fails: without and with e-stop.
 
-        The first item, for the case without an e-stop, contains Stop. The second item, for a
-        latched e-stop, contains the emergency stop and then Stop. Both also switch brush and lift
-        off.
+        The first item contains Stop; the second contains the emergency stop, then Stop. Both switch
+        brush and lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

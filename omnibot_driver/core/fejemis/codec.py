@@ -2,9 +2,7 @@
 
 """Parses one line of text into a message.
 
-Extra fields are ignored, because newer firmware adds fields.
-
-The module knows keywords, fields and ranges; it does not know checksums or other lines.
+Extra fields are ignored, because newer firmware adds fields. The module does not know checksums.
 """
 
 import math

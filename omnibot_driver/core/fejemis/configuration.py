@@ -2,10 +2,7 @@
 
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
-A value is used only after the board has reported it twice in a row, because 1 in 99 damaged lines
-has a correct checksum.
-
-The module knows which line requests which numbers; it does not know when the robot stands still.
+A value is used only after two equal reports in a row: 1 in 99 damaged lines has a correct checksum.
 """
 
 import math
@@ -38,29 +35,29 @@ EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
 DIGIT: Final = 6e-4
-"""``NEAR``, ``DIGIT``: tolerances for the difference between a number that was written to the board
-and the number that the board reports. ``NEAR`` is relative, ``DIGIT`` is absolute, and the larger
-one applies: the board prints few digits, so the relative error of a small number can be above
-``NEAR``."""
+"""``NEAR`` (relative), ``DIGIT`` (absolute): tolerances for a number that the board reports back.
+The larger one applies, because the board prints few digits.
+"""
 HALF: Final = 0.51
-"""Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last digit that the
-board prints. It is half a unit for the rounding of a printed number, and a little more, because the
-board's numbers have single precision. If the last digit is unknown, there is no limit."""
+"""Upper limit of this tolerance, in units of the last digit that the board prints: half a unit for
+rounding, and a little for single precision. No limit if the last digit is unknown.
+"""
 
 
 class Configuration:
     """Configuration of one board.
 
-    ``told``: the confirmed numbers, which the board has reported twice in a row. The keys are the
-    keywords of the lines that report the numbers, such as ``conf``.
+    ``told``: numbers that the board has reported twice in a row, by the keyword of their line, such
+    as ``conf``.
     """
 
     def __init__(self, role: Role, written: Mapping[Written, tuple[float, ...]]) -> None:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers that the board reported last. The keys are the keywords of the lines. Numbers are
-        confirmed when the board reports the same numbers twice in a row."""
+        """Numbers that the board reported last, by the keyword of their line. The same numbers in
+        the next report are confirmed.
+        """
         self._digits: dict[str, tuple[float, ...]] = {}
         """For each number in the newest line of a kind: the unit of its last printed digit, such as
         0.001 for ``0.420``. The keys are the keywords of the lines."""
@@ -158,8 +155,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None if they are unknown.
 
-        The user's values are returned if the board has not reported its values, or if the board's
-        values are the user's values, but rounded.
+        The user's values are returned while the board has reported none, or if the board has only
+        rounded them.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

@@ -2,8 +2,7 @@
 
 """Splits the bytes from one board into lines, checks the lines, and counts the damaged ones.
 
-The decoder does not read a clock and never raises on input. Between calls, it holds at most 200
-bytes (``LONGEST_LINE``).
+No input raises an error. At most ``LONGEST_LINE`` bytes are held between calls.
 """
 
 from dataclasses import dataclass
@@ -18,9 +17,9 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""How many heartbeats in a row must differ from ``sums`` before the decoder changes ``sums``. A
-heartbeat differs if it has a checksum and ``sums`` is False, or the reverse. While ``sums`` is
-unknown, one heartbeat is enough."""
+"""How many heartbeats in a row must contradict ``sums`` before ``sums`` changes. While ``sums`` is
+unknown, one heartbeat decides.
+"""
 
 
 @dataclass(slots=True)
@@ -38,15 +37,11 @@ class DecoderStatistics:
 class FejemisDecoder:
     """Decoder of the lines from one board.
 
-    ``sums``: whether the board's lines have checksums; None while unknown.
-
-    ``changed``: whether ``sums`` has changed. The caller resets this flag.
-
-    ``doubtful``: whether the last line that is not a heartbeat contradicts ``sums``; False unless
-    the user's setting is auto. While ``doubtful`` is True, the driver's lines to the board carry no
-    checksum.
-
-    ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.
+    * ``sums``: whether the board's lines have checksums; None while unknown.
+    * ``changed``: whether ``sums`` has changed. The caller resets this flag.
+    * ``doubtful``: whether the last line other than a heartbeat contradicts ``sums``; only with the
+      setting auto. Lines to the board then carry no checksum.
+    * ``contradicted``: whether the last line contradicts the user's setting ``line_sums``.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

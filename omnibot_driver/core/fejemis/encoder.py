@@ -2,10 +2,7 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-The caller sends the packets that ``Encoder.encode`` returns, and then passes the same packets to
-``Encoder.meaning``.
-
-The module knows geometry and lines; it does not know when lines are sent.
+The caller sends the packets from ``Encoder.encode``, and then passes them to ``Encoder.meaning``.
 """
 
 from typing import Protocol
@@ -84,11 +81,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        There are two reasons to do so:
-
-        * The angle limits the speed, so each new angle changes the limit.
-        * The lines have no checksums, so a board may obey a damaged line. The next angle comes
-          after 15 ms, and the lines that follow it replace the damaged line.
+        * If the angle limits the speed: each new angle changes the limit.
+        * If the lines have no checksums: new lines after 15 ms replace a damaged one.
         """
         return self.held or not self._pair.with_sums
 
@@ -112,11 +106,10 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist of the robot's body that ``packets`` command.
+        """Return the twist of the robot's body that the sent ``packets`` command.
 
-        ``packets``: packets that were sent. If they are the packets of the last motion from
-        ``encode``, the result is the twist that ``encode`` computed for the front wheel's angle.
-        For other packets, and in a second call with the same packets, the result is a standstill.
+        The result is a standstill, unless ``packets`` are those of the last motion from ``encode``,
+        passed for the first time.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Checks that the front wheel follows its commanded angle, and refuses motion if it does not.
+"""Checks that the front wheel follows its commanded angle, and otherwise refuses motion.
 
-After a first fault, motion is refused until the wheel moves. After a second fault within 60 s,
-motion is refused until the user calls ~/start.
-
-The module knows angles and times; it does not know lines or speeds.
+* After a first fault: until the wheel moves, or the user calls ~/start.
+* After a second fault within 60 s: until the user calls ~/start.
 """
 
 import math

@@ -2,10 +2,8 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A line in another form is regarded as damaged. If three such lines in a row have the same form, the
-third is accepted, and its form is the learnt form from then on.
-
-The module knows forms; it does not know the meaning of a line.
+A line in another form is regarded as damaged. The third such line in a row with the same form is
+accepted, and changes the learnt form.
 """
 
 from typing import Final
@@ -13,10 +11,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum.
-
-The decoder counts the lines that do not have the learnt form, among 24 lines of one kind. When this
-count reaches the limit, the decoder no longer checks the form of this kind of line.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum. If as
+many of 24 lines of one kind lack the learnt form, the form of this kind is no longer checked.
 """
 OF: Final = 24
 

@@ -19,10 +19,8 @@ SICK_LINES: Final = 3
 """How many lines in a row must report a fault before the angle sensor is regarded as faulty."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Tolerance, in degrees, for the change from the last accepted angle to a new one.
-
-The limit of the change is this tolerance, plus the angle by which the wheel can have turned in the
-meantime at its highest speed (``FASTEST_DEGPS``).
+"""Tolerance, in degrees, for the change from the last accepted angle to a new one. The change at
+the wheel's highest speed (``FASTEST_DEGPS``) is allowed in addition.
 """
 BITS: Final = (
     (10, False, "broken Hall element"),
@@ -44,9 +42,8 @@ of the bit, its value without a fault, and the name of the fault."""
 class FrontWheel:
     """State of the front wheel.
 
-    ``angle_rad``: the last accepted angle in rad. It is NaN before the first angle is accepted.
-
-    ``heard_at``: time in s at which the last accepted angle arrived.
+    * ``angle_rad``: the last accepted angle in rad; NaN before the first.
+    * ``heard_at``: arrival time of the last accepted angle in s.
     """
 
     def __init__(self) -> None:
@@ -109,8 +106,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always accepted. A later angle is accepted if it is near the last
-        accepted angle, or near a rejected angle that came directly before it.
+        The first angle is always accepted. A later one must be near the last accepted angle, or
+        near a rejected angle directly before.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -35,8 +35,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-The driver subscribes to ``confs`` (steering geometry), and never requests it with the line
-``confsi``: if that line loses its last letter, the board sets its geometry to zero.
+``confs`` is never requested with ``confsi``: if that line loses its last letter, the board sets its
+geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
@@ -48,8 +48,9 @@ SLOW: Final = 0.5
 """If fewer lines than this fraction of the expected number arrive, the driver subscribes again to
 the stream that driving requires."""
 ASK_AGAIN_S: Final = 0.1
-"""Time in s between two requests for the heartbeat. The driver sends these requests as long as it
-does not know whether the board has restarted."""
+"""Time in s between two requests for the heartbeat, while it is unknown whether the board has
+restarted.
+"""
 MANY: Final = 30
 """How many damaged or unknown lines per second are tolerated. The drive board sends about 400 lines
 per second, the front board about 85."""
@@ -61,14 +62,11 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 class Half:
     """State of one half: the drive board or the front board.
 
-    ``identity``: the identity in its heartbeats; None before the first heartbeat.
-
-    ``restarted``: whether the board has restarted. The caller resets this flag.
-
-    ``heard_at``: time in s of the last valid line.
-
-    ``clocks``: the clocks of both boards from earlier connections, by identity. Both halves share
-    them, because the boards may have exchanged their ports since then.
+    * ``identity``: the identity in its heartbeats; None before the first heartbeat.
+    * ``restarted``: whether the board has restarted. The caller resets this flag.
+    * ``heard_at``: time in s of the last valid line.
+    * ``clocks``: clocks of both boards from earlier connections, by identity. Both halves share
+      them, because the boards may exchange their ports.
     """
 
     def __init__(self, line_sums: LineSums, clocks: dict[int, TeensyClock]) -> None:
@@ -105,19 +103,19 @@ class Half:
         self._left = False
         self._at: dict[str, float] = {}
         self._needed, self._needed_since, self._was_slow = 0, math.inf, False
-        """How many lines of the stream that driving requires have arrived since the time
+        """``_needed``: number of lines of the stream that driving requires, since
         ``_needed_since``, in s; infinity before the first check. ``_was_slow``: whether the last
-        check found too few of them."""
+        check found too few lines.
+        """
         self._next_at = -math.inf
         self._unsure_at: float | None = None
         self._ask_at = -math.inf
 
     @property
     def unsure(self) -> bool:
-        """Whether the board may have restarted, and so may have lost the user's settings.
+        """Whether the board may have restarted and lost the user's settings.
 
-        This is so from the time at which the stream that driving requires is missing, until the
-        next heartbeat. The board's time in that heartbeat shows whether the board has restarted.
+        True from a loss of the stream that driving requires until the next heartbeat.
         """
         return self._unsure_at is not None
 
@@ -129,9 +127,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        The caller must not collect the messages first. If a message shows a restart, the half
-        deletes the board's earlier times, but the caller needs them for the messages before the
-        restart.
+        A message that shows a restart deletes the board's earlier times, which the messages before
+        it need.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):
@@ -148,8 +145,7 @@ class Half:
     def not_understood(self, now: float) -> bool:
         """Return whether more than ``MANY`` lines were damaged or unknown in the current second.
 
-        The caller calls this method after each read. A new second begins with the first call after
-        the last second has ended.
+        Call this method after each read: it also begins the next second.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults
@@ -214,9 +210,8 @@ class Half:
     def _is_slow(self, now: float) -> bool:
         """Return whether the stream that driving requires is much slower than its subscription.
 
-        Another program may have subscribed to it with a longer period. The method compares the
-        number of lines since its last call with the expected number. Two calls in a row must find
-        too few lines: after the first, lines may still wait to be read.
+        Another program may have changed the period. Two calls in a row must find too few lines:
+        after the first, lines may still wait to be read.
         """
         assert self.role is not None
         count, since = self._needed, self._needed_since

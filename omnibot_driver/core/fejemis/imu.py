@@ -1,12 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Computes when the board took each sample of its IMU, and converts the sample to SI units.
+"""Computes the sampling time of each IMU sample, and converts the sample to SI units.
 
-The board's lines carry no sampling time, but the board takes a sample every 10 ms. So each sampling
-time is a sum: a constant time, the *phase*, plus a whole number of periods of 10 ms. The driver
-finds the phase from the arrival times of the samples.
-
-Input: pairs of a gyro line and an acceleration line, formed by ``imu_pairs.py``.
+The board takes a sample every 10 ms, but sends no sampling times. A sampling time is a constant
+*phase* plus whole periods; the arrival times determine the phase.
 """
 
 import math
@@ -22,35 +19,31 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit for the time between the arrivals of two successive samples, in sampling periods.
 
-The limit is used if both samples seem to be late by about a period or more. There are two possible
-causes:
+If both samples seem late by about a period or more:
 
-* Above the limit, an earlier sample was lost. Both samples are on time, about one period apart.
-* Below the limit, the host has stalled. Both samples have waited, and were read shortly after one
-  another. No sample was lost.
+* Above the limit, an earlier sample was lost.
+* Below the limit, the host has stalled, and no sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 BLOCK_S: Final = 0.5
-"""Shortest time in s in which the samples of a block arrive.
-
-After a stall, hundreds of late samples arrive at once. Because of this shortest time, they cannot
-fill a block alone: each block needs a sample that was on time.
+"""Shortest time in s in which the samples of a block arrive. It prevents that the late samples
+after a stall fill a block alone.
 """
 EARLY_S: Final = 5e-4
 """If a sample seems early by more than this time, in s, fewer samples were lost before it than
-assumed: two samples were only late."""
+assumed.
+"""
 
 
 class ImuSamples:
     """Converter of IMU samples to readings, and of their arrival times to sampling times.
 
-    ``unit``: unit in which the board sends accelerations.
-
-    ``rates``: the gyro rates of the last sample, in rad/s. ``forces``: the accelerations of the
-    last sample, in m/s². Before the first sample, both are NaN.
+    * ``unit``: unit in which the board sends accelerations.
+    * ``rates``: gyro rates of the last sample, in rad/s; NaN before the first.
+    * ``forces``: accelerations of the last sample, in m/s²; NaN before the first.
     """
 
     def __init__(self, unit: AccelerationUnit) -> None:
@@ -71,8 +64,8 @@ class ImuSamples:
         self._block_s, self._block_from, self._block_at_s = math.inf, 0, 0.0
         self._delay_s = 0.0
         self._guessed = 0
-        """Number of samples that are counted as lost, although this is not certain yet: two
-        successive samples seemed to be late. A later sample will show whether it is right."""
+        """Number of samples that are counted as lost, but may only be late. Later samples decide.
+        """
 
     def reading(self, pair: Pair) -> ImuReading:
         """Convert a pair of lines to a reading in SI units."""
@@ -85,17 +78,12 @@ class ImuSamples:
     def sampled_s(
         self, arrived_s: float, not_before_s: float, next_pose_s: float, skipped: int
     ) -> float:
-        """Return the time at which the board took the next sample, in s of the board's clock.
+        """Return the time at which the board took the next sample. All times are in s of its clock.
 
-        ``arrived_s``: arrival time of this sample, in s of the board's clock.
-
-        ``not_before_s``: time of the last pose before the sample.
-
-        ``next_pose_s``: time of the pose that arrived next after the sample; infinity if no pose
-        has arrived since then.
-
-        ``skipped``: number of incomplete samples between the previous sample and this one. They
-        were left out.
+        * ``arrived_s``: arrival time of this sample.
+        * ``not_before_s``: time of the last pose before the sample.
+        * ``next_pose_s``: time of the first pose after the sample; infinity if none has arrived.
+        * ``skipped``: number of incomplete samples since the previous sample.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -129,13 +117,11 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Update the phase of the sampling times after a new sample has arrived.
+        """Update the phase of the sampling times after a new sample.
 
-        ``delay_s``: time in s from the sample's sampling time, computed with the old phase, to its
-        arrival.
-
-        The new phase is the latest one with which no recent sample arrives before its sampling
-        time. Recent samples are those of the last three complete blocks, and those that came later.
+        ``delay_s``: time in s from sampling, by the old phase, to arrival. The new phase is the
+        latest one with which no recent sample arrives before its sampling time. Recent samples are
+        those of the last three complete blocks, and later ones.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

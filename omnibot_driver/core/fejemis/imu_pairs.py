@@ -24,64 +24,49 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""Limit, in s, for the time between the two lines of a pair. If this time is as long as the
-limit or longer, the pair may be false, so the pair must wait for the next pose."""
+"""Time in s between the two lines of a pair from which the pair may be false. Such a pair must wait
+for the next pose.
+"""
 SILENT_S: Final = 0.1
 """Longest usual time, in s, without gyro and acceleration lines.
 
-After a longer time, either the board sent nothing, or the host read late. The next pose shows which
-is true, so each new pair waits for this pose, even if its two lines came close together. If the
-board sent nothing, the sampling time of the pair is unknown, and the pair is rejected.
+After a longer time, new pairs wait for the next pose. The pose shows whether the host read late, or
+the board sent nothing; in the second case, the pairs are rejected.
 """
 WARY_S: Final = 1.0
-"""Time in s after a stall of the driver. During this time, every new pair must wait for the next
-pose. The reason: while the driver stalled, the kernel's buffer may have overflowed. Then lines
-are lost, although the driver sees no silence."""
+"""Time in s after a stall of the driver in which new pairs must wait for the next pose: the
+kernel's buffer may have overflowed and lost lines.
+"""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits, in s, for the difference ``_evidence_s``, which shows which line of a sample comes first.
-
-The difference is the sum of the intervals before gyro lines, minus the sum of the intervals before
-acceleration lines. An interval begins at the previous line of the other kind, and is longer between
-two samples than within a sample. So if the difference is positive, the gyro line comes first. If it
-is negative, the acceleration line comes first.
-
-``KNOWN_S``: least magnitude of the difference at which its sign is used.
-
-``SUREST_S``: largest magnitude of the difference.
+"""``KNOWN_S``: magnitude of ``_evidence_s``, in s, from which its sign shows which line of a sample
+comes first. ``SUREST_S``: largest magnitude.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to an interval between a gyro and an acceleration line if a line of
-another kind arrives in it. Such an interval is probably between two samples; the added time makes
-it longer than an interval within a sample."""
+"""Time in s that is added to an interval between a gyro and an acceleration line if another line
+arrives in it. Such an interval is probably between two samples.
+"""
 PATIENCE: Final = 60
-"""Number of intervals after which the driver decides which line of a sample comes first, even if
-the magnitude of ``_evidence_s`` is still below ``KNOWN_S``. The magnitude stays small if the two
-lines are half a period apart: all intervals are then equally long."""
+"""Number of intervals after which the first line of a sample is decided, even if the magnitude of
+``_evidence_s`` is below ``KNOWN_S``. It stays small if all intervals are equally long.
+"""
 MOST: Final = 10
-"""Largest magnitude of a counter in ``_outside``. Each kind of line has a counter, except gyro and
-acceleration lines. A positive counter means that lines of this kind usually come between two pairs.
-A negative counter means that they usually come within a pair."""
+"""Largest magnitude of a counter in ``_outside``."""
 UNPOSED: Final = 20
-"""Limit for the number of gyro lines, and of acceleration lines, since the last pose. If one of the
-two numbers exceeds the limit, a pair that still waits for the next pose is rejected."""
+"""Number of gyro lines, or of acceleration lines, since the last pose, above which a pair that
+waits for the next pose is rejected.
+"""
 
 
 @dataclass(slots=True)
 class Pair:
     """A gyro and an acceleration line, probably of one sample.
 
-    ``at``: time in s at which the second line arrived.
-
-    ``pose_s``: the board's time of the last pose before the pair.
-
-    ``skipped``: how many incomplete samples were left out since the previous pair.
-
-    ``doubtful``: whether the pair must wait for the next pose: because it may be false, because it
-    came after a silence, or because it came soon after a stall of the driver.
-
-    ``next_pose_s``: the board's time of the next pose, if this pose arrived before ``take``
-    returned the pair.
+    * ``at``: time in s at which the second line arrived.
+    * ``pose_s``: the board's time of the last pose before the pair.
+    * ``skipped``: number of incomplete samples since the previous pair.
+    * ``doubtful``: whether the pair must wait for the next pose.
+    * ``next_pose_s``: the board's time of the next pose; infinity if it has not arrived.
     """
 
     gyro: Gyro
@@ -112,9 +97,10 @@ class ImuPairs:
         """The kind of line, gyro or acceleration, that comes first in a sample; None while
         unknown."""
         self._evidence_s = 0.0
-        """The sum of the intervals before gyro lines, minus the sum of the intervals before
-        acceleration lines, in s. If it is positive, the gyro line of a sample comes first; the text
-        on ``SUREST_S`` gives the reason."""
+        """Sum of the intervals before gyro lines, minus the sum of those before acceleration lines,
+        in s. The interval before the first line of a sample is longer, so a positive value shows
+        that the gyro line comes first.
+        """
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -125,9 +111,9 @@ class ImuPairs:
         pairs increase the counter, and lines within a pair decrease it."""
         self._skipped = 0
         self._silent = False
-        """Whether there was a silence: a time of more than ``SILENT_S`` between two successive gyro
-        or acceleration lines. After a silence, new pairs are doubtful. This ends with the next
-        pose, or when ``take`` rejects a pair because no pose comes."""
+        """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines.
+        New pairs are then doubtful until the next pose, or until ``take`` rejects a pair.
+        """
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -147,12 +133,10 @@ class ImuPairs:
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Receive a line that is neither a gyro nor an acceleration line.
+        """Receive a line of another ``kind``, its keyword.
 
-        If a pair waits for its second line, this second line is now regarded as lost. Exception:
-        lines of this ``kind`` usually come between the two lines of a pair.
-
-        ``kind``: the keyword of the line.
+        If a pair waits for its second line, this line is regarded as lost, unless lines of this
+        ``kind`` usually come within a pair.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -165,14 +149,13 @@ class ImuPairs:
         self._queue.append((attitude, now))
 
     def pose(self, time_s: float) -> None:
-        """Receive the board's time of a pose, and accept or reject all pairs that still wait.
+        """Receive the board's time of a pose, and accept or reject all waiting pairs.
 
-        All of them are rejected in two cases:
+        They are rejected in two cases:
 
-        * Both gyro and acceleration lines are missing: of each kind, fewer lines have arrived than
-          the board sends between the two poses. Then any of the pairs may be false.
-        * The time since the previous pose is unknown: at the first pose, and at a pose whose time
-          is before that of the previous pose.
+        * Fewer gyro lines and fewer acceleration lines have arrived than the board sends between
+          two poses.
+        * The time since the previous pose is unknown.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
@@ -189,10 +172,10 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the pairs and orientations in order of arrival, until a pair must wait for a pose.
+        """Return the pairs and orientations in order of arrival, up to the first pair that must
+        wait.
 
-        This doubtful pair and everything after it stay in the queue. The caller calls this method
-        after a pose and at the end of a read.
+        Call this method after a pose and at the end of a read.
         """
         taken: list[Pair | Oriented] = []
         while self._queue:
@@ -265,10 +248,9 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Count lines, to learn whether a kind of line usually comes between pairs or in a pair.
+        """Count lines, to learn whether a kind of line comes between pairs or within a pair.
 
-        ``kinds``: the kinds of the lines. ``step``: 1 if they came between two pairs, -1 if they
-        came within a pair.
+        ``step``: 1 for ``kinds`` that came between two pairs, -1 for those within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))

@@ -19,20 +19,18 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""A function that receives the front wheel's angle in rad and the time in s.
+"""Function that receives the front wheel's angle in rad and the time in s.
 
-It returns True if the angle shows a new fault: the wheel does not turn to its commanded angle.
+It returns True for a new fault: the wheel does not turn to its commanded angle.
 """
 
 
 class Inbound:
     """Handler of all messages.
 
-    ``mode``: the mode of the robot. It is nominal while both boards send data and the drive board
-    obeys.
-
-    ``relay_rad``: a new angle of the front wheel that the driver must still send to the drive
-    board; None if there is none.
+    * ``mode``: nominal while both boards send data and the drive board obeys.
+    * ``relay_rad``: angle of the front wheel that must still be sent to the drive board; None if
+      there is none.
     """
 
     def __init__(

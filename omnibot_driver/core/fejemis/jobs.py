@@ -2,8 +2,8 @@
 
 """Runs the user's jobs one at a time, and checks whether they succeed.
 
-A job is a calibration, saving or loading of the configuration, or a power-off. The boards
-acknowledge none of them. The module does not read a clock.
+A job is a calibration, a power-off, or saving or loading of the configuration. The boards
+acknowledge none of them.
 """
 
 import math
@@ -64,8 +64,7 @@ reports the offsets."""
 def whole_seconds(delay_s: float) -> int:
     """Return the delay in whole seconds, at least 1.
 
-    A line can lose two digits of the delay on its way to the board. For some pairs of digits, the
-    checksum does not detect this loss. So the delay is increased until it contains no such pair.
+    The delay is increased until the checksum detects the loss of any two of its digits.
     """
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
@@ -76,11 +75,9 @@ def whole_seconds(delay_s: float) -> int:
 class Jobs:
     """Runner of jobs, at most one at a time.
 
-    ``done``: results of ended jobs, which the caller has to take.
-
-    ``powering_off``: whether the drive board will soon cut the power.
-
-    ``reload``: whether to read the configuration again. The caller resets this flag.
+    * ``done``: results of ended jobs, which the caller has to take.
+    * ``powering_off``: whether the drive board will soon cut the power.
+    * ``reload``: whether to read the configuration again. The caller resets this flag.
     """
 
     def __init__(self) -> None:
@@ -121,9 +118,8 @@ class Jobs:
     ) -> None:
         """Begin a job after ``wait_s`` seconds. Raises RequestRefused while another job runs.
 
-        ``token``: identifies the job in its result.
-
-        ``delay_s``: time in s until the board cuts the power; only for a power-off.
+        * ``token``: identifies the job in its result.
+        * ``delay_s``: time in s until a power-off.
         """
         if self.job is not None:
             raise RequestRefused(
@@ -286,12 +282,10 @@ class Jobs:
 
 
 def _answers(role: Role, message: Message) -> bool:
-    """Return whether ``message`` answers the query that the driver sends after ``eer``.
+    """Return whether ``message`` answers the query after ``eer``, the command to load a
+    configuration.
 
-    The board does not answer ``eer``, the command to load the configuration. An answer to the query
-    that follows (``confi`` to the drive board, ``fwoi`` to the front board) shows that the board
-    receives lines. The answer "unhandled" counts too: it comes from a front board that does not
-    know ``fwoi``.
+    ``eer`` itself has no answer. "unhandled" counts too: some front boards do not know ``fwoi``.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -2,9 +2,8 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-The board does not acknowledge these lines, so they are repeated. Exception: the line of a lift
-command is sent only once. If the line for 0 V is lost, the lift still stops, because each line that
-moves the lift limits the run time.
+Lines are repeated, because the board does not acknowledge them. A line that moves the lift is sent
+once; it limits the run time, so the lift stops even if the next line is lost.
 """
 
 import math
@@ -23,16 +22,13 @@ BRUSH_AGAIN_S: Final = 1.0
 PACE_S: Final = 0.05
 """Shortest time in s between two lines for the lift, or between two lines for the lights.
 
-If several commands come within this time, only the newest is sent. A stop of the lift is sent at
-once.
+Of several commands in this time, only the newest is sent. A stop of the lift is sent at once.
 """
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Smallest voltage that the driver sends to the lift, as a fraction of the commanded voltage.
-
-If the checksum could not detect damage to the line with the commanded voltage, the driver sends a
-lower voltage instead.
+"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage. A lower
+voltage is sent if the checksum could not detect damage to the line.
 """
 LEAST_TIME_S: Final = 0.04
 
@@ -40,9 +36,8 @@ LEAST_TIME_S: Final = 0.04
 class Machine:
     """State of brush, lift and lights.
 
-    ``volts``: voltage of the lift in V; 0 when its run time is over.
-
-    ``colour``: red, green and blue of the lights; None before the first command.
+    * ``volts``: voltage of the lift in V; 0 when its run time is over.
+    * ``colour``: red, green and blue of the lights; None before the first command.
     """
 
     def __init__(self) -> None:
@@ -52,11 +47,8 @@ class Machine:
         self._lift_line = b""
         """The line for the lift that is still to be sent; empty if there is none."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """``_lift_at``: time in s at which to send the line for the lift.
-
-        ``_lift_again_at``: earliest time in s at which to send another line for the lift.
-
-        ``_lift_until``: time in s at which the lift's motion ends.
+        """Times in s: when to send the line for the lift, the earliest time for another line, and
+        the end of the lift's motion.
         """
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
@@ -167,9 +159,8 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The line contains only numbers with which the checksum detects damage to the line. So the sent
-    voltage may be lower than ``volts``, but it is at least ``LEAST_PART * volts``. Such a voltage
-    exists for all ``volts`` from ``LEAST_VOLTS`` to ``MOST_VOLTS``.
+    The voltage may be lower than ``volts``, so that the checksum detects damage to the line, but it
+    is at least ``LEAST_PART * volts``.
     """
     if not volts:
         return OFF[0], 0.0

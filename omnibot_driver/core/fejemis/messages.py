@@ -2,8 +2,8 @@
 
 """The messages that the two boards send: one class for each kind of line.
 
-Units are the boards': m, m/s, m/s², s, µT, V, A, and degrees or rad. Each class says which of these
-two it uses.
+Units are the boards': m, m/s, m/s², s, µT, V, A. Each class says whether its angles are in degrees
+or rad.
 """
 
 from dataclasses import dataclass
@@ -151,10 +151,10 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: two distances in m, ``first_m`` and ``second_m``, in the order of the line.
+    """``confs``: track and distance from the axle to the steered wheel, in m, in the order of the
+    line.
 
-    One is the distance from the axle to the steered wheel, the other is the track. The boards' help
-    text says that the track is second, but some boards report it first.
+    The boards' help text says that the track is second, but some boards report it first.
 
     ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
     """

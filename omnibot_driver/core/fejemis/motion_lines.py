@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes ``rc`` lines so that the checksum detects the loss of any two characters.
+"""Writes ``rc`` lines in which the checksum detects the loss of any two characters.
 
-A line has a speed and a turn rate. The front board uses only their ratio, the drive board only the
-square root of the sum of their squares. So several lines command the same motion. Of the lines in
-which the checksum detects such a loss, the module selects the one that is nearest to the command.
+Several pairs of speed and turn rate command the same motion: the front board uses only their ratio,
+the drive board only the root of the sum of their squares. The safe line nearest to the command is
+selected.
 """
 
 import math
@@ -18,25 +18,21 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Limit, in m/s, for the commanded speed in a curve.
-
-Below this limit, the front board's line contains the speed 0. The reason: only few numbers below
-the limit can be sent safely.
+"""Speed in a curve, in m/s, below which the front board's line contains the speed 0. Few smaller
+numbers can be sent safely.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""
 ANGLE_COST: Final = 1e4
-"""Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle.
-
-For comparison: a line whose speed is wrong by a factor of 2.7 (e) costs 1.
+"""Cost of an error of 1 rad in the front wheel's angle. For comparison: a speed that is wrong by a
+factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""Divisor that gives the smallest linear speed in the drive board's line, apart from 0.
+"""The smallest linear speed in the drive board's line, apart from 0, is the outer wheel's speed
+divided by ``SLOWEST``.
 
-This speed is the outer wheel's speed divided by ``SLOWEST``. In forward motion, the line can also
-contain the linear speed 0. In backward motion, it cannot, because the sign of the linear speed
-gives the direction.
+Only a forward line can contain the linear speed 0: the sign gives the direction.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
@@ -103,11 +99,10 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the line with the lowest cost among the lines whose checksum would reveal damage.
+    """Return the line with the lowest cost among those whose checksum would reveal damage.
 
-    If there is no such line, return the line with the lowest cost of all lines.
-
-    ``signs``: the signs of speed and turn rate, as text.
+    Without such a line, return the line with the lowest cost. ``signs``: those of speed and turn
+    rate.
     """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)

@@ -2,12 +2,9 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-The checksum is the sum of a line's character codes, modulo 99. It does not change if two characters
-are lost whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, ``-`` and
-``6``. So a line should not contain both characters of such a pair.
-
-Each motion line begins with ``rc 2``, so its numbers must not contain ``1``. For example, values
-between .0999 and .200 cannot be sent.
+The checksum misses two lost characters whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``,
+``.`` and ``5``, ``-`` and ``6``. A line must not contain both. Motion lines begin with ``rc 2``, so
+their numbers contain no ``1``.
 """
 
 from bisect import bisect_left, bisect_right
@@ -24,10 +21,8 @@ LARGEST: Final = 4
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all safe numbers in rising order, and the text of each number.
 
-    A number is safe if the checksum of its line detects the loss of any two of its characters.
-
-    ``negative``: whether the numbers are for a line that contains a minus sign. They then contain
-    no ``6``, because the checksum does not detect the loss of a ``-`` together with a ``6``.
+    In a safe number, the checksum detects the loss of any two characters. ``negative``: whether the
+    line contains a minus sign; its numbers then contain no ``6``.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.
@@ -45,13 +40,10 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """Return the safe number that is nearest to a positive ``number``, with its text.
+    """Return the safe number (``numerals``) that is nearest to a positive ``number``, with its
+    text.
 
-    A safe number (``numerals``) is one in which the checksum detects the loss of any two
-    characters.
-
-    ``down``: whether the result must not exceed ``number``. If all safe numbers exceed it, the
-    smallest of them is returned.
+    ``down``: whether the result must not exceed ``number``, unless all safe numbers do.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -61,9 +53,8 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 
 
 def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the safe numbers just below and just above ``number``, with their texts.
-
-    If any two characters of a safe number (``numerals``) are lost, the checksum detects this.
+    """Return the safe numbers (``numerals``) just below and just above ``number``, with their
+    texts.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
@@ -72,10 +63,7 @@ def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
 
 
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the safe numbers from ``least`` to ``most``, with their texts.
-
-    If any two characters of a safe number (``numerals``) are lost, the checksum detects this.
-    """
+    """Return the safe numbers (``numerals``) from ``least`` to ``most``, with their texts."""
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))
     return list(zip(numbers[part], texts[part], strict=True))

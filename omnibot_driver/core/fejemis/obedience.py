@@ -2,11 +2,8 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-The driver sends ``stop`` for a pause and for its own e-stop. It sends ``start`` by itself when the
-e-stop is released, but after a pause only at the user's request.
-
-The module knows times and rcSource, the source of the commands that the board obeys; it does not
-know lines.
+The driver sends ``stop`` for a pause and for its own e-stop. It sends ``start`` by itself only when
+the e-stop is released; after a pause, the user must request it.
 """
 
 import math
@@ -25,12 +22,10 @@ START_AGAIN_S: Final = 0.2
 class Obedience:
     """State that shows whether the drive board obeys motion commands, and why not.
 
-    ``estopped``: whether the driver's e-stop is latched.
-
-    ``source``: the last rcSource, the source of the commands that the board obeys; None before the
-    first heartbeat.
-
-    ``pause_said``: whether the user has requested a pause since the last start.
+    * ``estopped``: whether the driver's e-stop is latched.
+    * ``source``: the last rcSource, the source of the obeyed commands; None before the first
+      heartbeat.
+    * ``pause_said``: whether the user has requested a pause since the last start.
     """
 
     def __init__(self) -> None:

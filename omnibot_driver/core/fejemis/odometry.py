@@ -2,9 +2,8 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-Poses have steps of 1 mm; in 20 ms, such a step corresponds to 0.05 m/s. Wheel speeds are finer, but
-the motion that is summed up from them drifts away from the pose. So a displacement is computed from
-the wheel speeds, and corrected towards the newest pose. Without recent wheel speeds, or if they
+Poses have coarse steps of 1 mm, and the sum of wheel speeds drifts. So a displacement comes from
+the wheel speeds, and is corrected towards the newest pose. Without recent wheel speeds, or if they
 clearly contradict the pose, the pose alone decides.
 """
 
@@ -16,22 +15,18 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction by which one displacement corrects the difference between a pose and the wheels' motion.
-
-The driver uses this small fraction only if rounding of the pose can explain the difference.
+"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects,
+if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
-in units of the poses' last digit.
-
-A displacement depends on two rounded poses, so its error along each axis is at most one unit. The
-limit is higher, because the errors along both axes add up.
+in units of the poses' last digit. The errors along both axes add up.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""``SLACK_M``, ``SLACK_RAD``: limits for the deviation of a pose from the wheels' motion, in m and
-rad. The driver adds to each limit the motion that an acceleration of ``SPEED_UP_MPS2`` can cause.
-It rejects a pose with a larger deviation."""
+"""``SLACK_M``, ``SLACK_RAD``: largest deviation of an accepted pose from the wheels' motion, in m
+and rad. The motion that an acceleration of ``SPEED_UP_MPS2`` can cause is allowed in addition.
+"""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -114,14 +109,11 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_new = self._speeds, speeds, True
 
     def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement from the previous pose to ``pose``, in a list.
+        """Return the displacement from the previous pose in a list; empty if there is none.
 
-        The list is empty if there is no displacement (see the method ``pose``).
-
-        Every 0.2 s, after a restart of the board, and at the beginning of a new coordinate frame,
-        the list also contains a PoseReading. The PoseReading is the pose with which the frame
-        began, plus all displacements that were returned since then. Displacements that a later
-        check rejects are included.
+        Every 0.2 s, after a restart of the board, and in a new coordinate frame, the list also
+        contains a PoseReading: the first pose of the frame, plus all displacements that were
+        returned since then, even if a later check rejects them.
         """
         displacement = self.pose(pose)
         if displacement is None:
@@ -134,10 +126,10 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad, restarted=moved)]
 
     def pose(self, pose: BoardPose) -> DisplacementReading | None:
-        """Return the displacement from the previous pose to ``pose``; None if ``pose`` is rejected.
+        """Return the displacement from the previous pose; None if ``pose`` is rejected.
 
-        For the first pose after the start of the driver, the result is None too, because there is
-        no previous pose. For the first pose after a restart of the board, the displacement is 0.
+        * For the driver's first pose: None.
+        * For the first pose after a restart of the board: a displacement of 0.
         """
         before, self._time_s = self._pose, pose.time_s
         if self._speeds_new:
@@ -221,10 +213,9 @@ class PoseOdometry:
         return _reading(log_of(jump), since_s)
 
     def _rolled(self, seconds: float) -> Pose | None:
-        """Return the motion in ``seconds``, computed from the last two pairs of wheel speeds.
+        """Return the motion in ``seconds``, computed from the mean of each wheel's last two speeds.
 
-        The speed of each wheel is the mean of its last two speeds. The result is None if the last
-        pair is too old, or if ``seconds`` exceeds ``FRESH_S``.
+        None if the last speeds are too old, or if ``seconds`` exceeds ``FRESH_S``.
         """
         speeds = self._speeds
         if speeds is None or self._time_s - self._speeds_s > FRESH_S or seconds > FRESH_S:

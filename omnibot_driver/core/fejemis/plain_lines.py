@@ -2,8 +2,8 @@
 
 """Writes motion lines (``rc``) without a checksum, in a form that limits the effect of damage.
 
-The form does not prevent all wrong motion. If a decimal point, a digit after the decimal point or a
-minus sign is lost, the board obeys a wrong number until it receives the next line.
+If a decimal point, a later digit or a minus sign is lost, the board obeys a wrong number until the
+next line.
 """
 
 import math
@@ -19,8 +19,7 @@ def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
 def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line: the outer wheel's speed with its sign, and a turn rate of 0.
 
-    The turn rate is not needed, because the board computes the turn from the angle of the front
-    wheel.
+    The board computes the turn from the angle of the front wheel.
     """
     # The line has a source (``2``), a speed and a turn rate. The board uses only the root of the
     # sum of squares. If the source or the space after it is lost, the 0 becomes the speed: the line

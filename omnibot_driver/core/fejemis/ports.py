@@ -1,12 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds out which half is at which port, and addresses lines to the halves.
+"""Finds out which board is at which port, and addresses lines to the boards.
 
-A *half* is one of the two Teensys (drive or front); it is also called a board.
-An unidentified board only gets lines that stop or switch off something, and requests for its
-heartbeat.
-
-The module knows identities and ports; it does not know the meaning of a line.
+Each of the two Teensys, drive and front, is also called a *half*. An unidentified board only gets
+requests for its heartbeat, and lines that stop or switch off something.
 """
 
 from dataclasses import replace
@@ -119,8 +116,8 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        If the port of this board is not known, the lines go to each port whose board has no known
-        role. If both boards have the same role, the lines go to both ports.
+        While its port is unknown, the lines go to each port without a known role; if there is no
+        such port, to both.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

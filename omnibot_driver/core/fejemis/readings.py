@@ -47,11 +47,9 @@ class MagneticReading:
 class BatteryReading:
     """State of the battery.
 
-    ``amps``: current in A, negative during discharge; NaN if unknown.
-
-    ``cells``: number of cells; 0 if unknown.
-
-    ``low``: whether the mean voltage of a cell is below the limit in the settings.
+    * ``amps``: current in A, negative during discharge; NaN if unknown.
+    * ``cells``: number of cells; 0 if unknown.
+    * ``low``: whether the mean voltage of a cell is below the limit in the settings.
     """
 
     volts: float

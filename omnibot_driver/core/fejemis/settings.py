@@ -45,19 +45,12 @@ class Written(Enum):
 class FejemisSettings:
     """The user's settings of the robot.
 
-    ``track_m``, ``wheelbase_m``: sizes in m that the driver uses until the boards report their own
-    sizes.
-
-    ``line_sums``: whether text lines carry a checksum. With ``auto``, the driver finds this out
-    from the heartbeats.
-
-    ``allow_reverse``: whether to send negative speeds (docs/boards/fejemis.md).
-
-    ``command_timeout_s``: longest time that the lift runs after one command.
-
-    ``low_cell_v``: voltage per cell below which the battery is reported as low.
-
-    ``written``: values that the driver writes to the boards. It only reads all other values.
+    * ``track_m``, ``wheelbase_m``: used until the boards report their own sizes, in m.
+    * ``line_sums``: whether text lines carry a checksum; with ``auto``, the heartbeats show this.
+    * ``allow_reverse``: whether to send negative speeds (docs/boards/fejemis.md).
+    * ``command_timeout_s``: longest time that the lift runs after one command.
+    * ``low_cell_v``: voltage per cell below which the battery is reported as low.
+    * ``written``: values that the driver writes to the boards.
     """
 
     track_m: float = 0.4

@@ -12,10 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of unknown lines that the diagnostics show.
-
-An unknown line is a line that the driver has sent, and that the firmware has reported as unknown.
-If there are more such lines, the diagnostics show the latest ones.
+"""Largest number of lines in the diagnostics that the firmware has reported as unknown. The latest
+ones are shown.
 """
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
@@ -23,13 +21,10 @@ SUMS: Final = {True: "on", False: "off", None: "unknown"}
 def figures(
     ports: Ports, upkeep: Upkeep, translation: Translation, source: float | None, trouble: str
 ) -> BoardFigures:
-    """Return counters and other values for diagnostics.
+    """Return counters and other values for diagnostics. Counters continue over all connections.
 
-    A new connection does not reset the counters.
-
-    ``source``: the source of the motion commands that the drive board obeys (rcSource).
-
-    ``trouble``: why the robot must not be driven; empty if driving is allowed.
+    * ``source``: rcSource, the source of the motion commands that the drive board obeys.
+    * ``trouble``: why the robot must not be driven; empty if driving is allowed.
     """
     return BoardFigures(
         rates_hz={"IMU": 100.0, "Odometry": 50.0},

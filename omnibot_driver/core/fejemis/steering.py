@@ -2,10 +2,8 @@
 
 """Converts a body twist into commands for both boards.
 
-The front wheel must first reach its angle. Until then, the driver commands a lower speed from the
-drive board, or a stop if a turn on the spot is to follow.
-
-The module knows geometry and angles; it does not know lines.
+Until the front wheel reaches its angle, the drive board gets a lower speed, or a stop before a turn
+on the spot.
 """
 
 import math
@@ -17,20 +15,17 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.values import value
 
 ACROSS_RAD: Final = math.radians(85.0)
-"""Limit of the front wheel's target angle, in rad. A command whose target angle reaches this limit
-is a turn on the spot."""
+"""Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
 """``ALIGNED_RAD``: largest deviation of the front wheel from its target angle, in rad, at which a
-turn on the spot may begin. Up to this deviation, other motion may have full speed.
+turn on the spot may begin, or other motion may have full speed.
 
 ``STILL_ALIGNED_RAD``: largest deviation, in rad, at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Permitted error of the body's velocity, given as a deviation of the front wheel in rad.
-
-At full speed, this deviation from the target angle causes exactly the permitted error. If the
-deviation is larger, the driver lowers the speed until the error is permitted.
+"""Deviation of the front wheel in rad that gives the permitted error of the body's velocity at full
+speed. At a larger deviation, the speed is lowered until the error is permitted.
 """
 
 
@@ -38,15 +33,11 @@ deviation is larger, the driver lowers the speed until the error is permitted.
 class Steered:
     """A command for both boards, and the resulting motion of the body.
 
-    ``speed_mps``, ``turn_radps``: speed and turn rate for the front board.
-
-    ``part``: factor, 0..1. The drive board gets the speed and the turn rate times this factor.
-
-    ``angle_rad``: the angle that the front wheel must reach.
-
-    ``twist``: the body's motion at the front wheel's current angle.
-
-    ``whole``: whether ``part`` is 1.
+    * ``speed_mps``, ``turn_radps``: speed and turn rate for the front board.
+    * ``part``: factor, 0..1, of the speed and turn rate for the drive board.
+    * ``angle_rad``: the angle that the front wheel must reach.
+    * ``twist``: the body's motion at the front wheel's current angle.
+    * ``whole``: whether ``part`` is 1.
     """
 
     speed_mps: float
@@ -76,8 +67,7 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 def scale(twist: BodyTwist, track_m: float) -> float:
     """Return the factor for speed and turn rate in a motion line (``rc``); 1 for a stop.
 
-    The drive board computes the speed of its outer wheel from the two numbers of the line. With
-    this factor, the result is the speed that the twist requires.
+    With this factor, the drive board's outer wheel gets the speed that the twist requires.
     """
     # The drive board drives its outer wheel at sqrt(v² + w²), and turns about a centre that follows
     # from the measured front angle. The factor makes the root equal to the speed that the outer
@@ -136,9 +126,8 @@ def _allowed(
 ) -> float:
     """Return the largest allowed rim speed of the outer wheel, in m/s; infinity without a limit.
 
-    ``angle_rad``: current angle of the front wheel. ``target_rad``: the angle that it must reach.
-
-    ``turning``: whether the body already turns on the spot.
+    * ``angle_rad``, ``target_rad``: current and target angle of the front wheel.
+    * ``turning``: whether the body already turns on the spot.
     """
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:

@@ -1,14 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The checksum ``;NN`` in front of a line. With it, a board detects most damaged lines.
+"""The checksum ``;NN`` in front of a line.
 
-The checksum does not detect the following damage:
+A board does not detect the following damage:
 
 * 1 in 99 random changes.
-* The loss of a ``c``, because the code of ``c`` is 99.
+* The loss of a ``c``, whose code is 99.
 * The loss of two characters whose codes add up to 99 or 198.
-
-The module knows characters; it does not know the meaning of a line.
 """
 
 import re

@@ -2,9 +2,8 @@
 
 """Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-Input: times of the board, and when the text lines with these times arrived. Text lines arrive late,
-never early. So the conversion is a straight line just below all arrival times, fitted by
-``core/timing/clock_fit.py``. docs/internals/time.md explains why.
+Lines arrive late, never early. So the conversion is a straight line just below all arrival times
+(docs/internals/time.md).
 """
 
 import math
@@ -23,29 +22,25 @@ If a line seems to arrive earlier than that, its board time is implausible.
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
 WAITED_S: Final = 1.0
-"""Length in s of a period that begins with the first line after a stall of the driver.
-
-In this period, a line is accepted however late it is, because it may have waited during the stall.
+"""Time in s, from the first line after a stall of the driver, in which a line is accepted however
+late it is: it may have waited during the stall.
 """
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """Tolerance in s within which implausible board times must agree to begin the clock anew.
 
-At least ``AGAIN`` such times in a row begin the clock anew if two conditions hold:
+* At least ``AGAIN`` such times in a row must agree: since the first, the board's time and the
+  arrival time advance by the same amount.
+* The last time must arrive at least ``AGAIN_AFTER_S`` s after the first.
 
-* From the first time to each of the others, the board's time and the arrival time advance by the
-  same amount, within this tolerance.
-* The last time arrives at least ``AGAIN_AFTER_S`` s after the first.
-
-The tolerance also applies to the times of lines that seem early.
+The tolerance also applies to lines that seem early.
 """
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s for which a line that seems early is counted together with later such lines.
+"""Longest time in s between lines that seem early and are counted together.
 
-A line seems early if it arrives earlier than the clock predicts. The cause is that the clock began
-with a late line. After three (``AGAIN``) lines that seem early, the clock begins anew. Late lines
-may arrive between these three.
+Lines seem early if the clock began with a late line. Three (``AGAIN``) such lines begin the clock
+anew, even if late lines come between them.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -71,24 +66,18 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """Number of implausible times in a row that agree with each other.
-
-        ``_odd``: the first of these times, and its time of arrival.
+        """Number of implausible times in a row that agree. ``_odd``: the first of these times, and
+        its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
-        """Board times that seem early by the present clock, each with its arrival time.
-
-        A time is stored if it seems early by at most ``LATE_S``. All stored times agree.
+        """Board times that seem early, by at most ``LATE_S``, each with its arrival time. All of
+        them agree.
         """
         self._last_s = 0.0
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection, and keep the times of the board.
-
-        Forget an earlier stall: the lines of the new connection did not wait for the end of that
-        stall.
-        """
+        """Begin a new connection: keep the board's times, but forget an earlier stall."""
         self._stalled, self._waited_until = False, -math.inf
 
     def stalled(self) -> None:
@@ -161,12 +150,10 @@ class TeensyClock:
         return True
 
     def _began_late(self, board_s: float, now: float) -> bool:
-        """Begin the clock anew if enough lines seemed early, and their times agree with each other.
+        """Begin the clock anew if enough lines seemed early and their times agree.
 
-        Return whether the clock has begun anew.
-
-        A line seems early if the clock began with a line that had waited for the host. If the clock
-        did not begin anew, the driver might reject all lines that did not wait.
+        Return whether the clock has begun anew. A clock that began with a late line could otherwise
+        reject all punctual lines.
         """
         agree = all(
             before_s < board_s
@@ -187,11 +174,10 @@ class TeensyClock:
 
 
 class StampedReadings:
-    """The readings that one call of the board returns, with their timestamps.
+    """The readings that one call of the board returns, with their timestamps; a ``ReadingClock``.
 
-    The class is a ``ReadingClock``, the interface that gives readings their timestamps. Two
-    timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. Only to keep this
-    difference, a timestamp may be later than the time of the call.
+    Timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. Only for this reason,
+    a timestamp may be later than the call.
     """
 
     skew_ppm = 0.0
@@ -207,11 +193,10 @@ class StampedReadings:
         self._stamps: list[float] = []
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
-        """Add a reading, and set its timestamp.
+        """Add a reading with the timestamp ``stamp_s``, but at most ``now``.
 
-        The timestamp is ``stamp_s``, but at most ``now``. There is one exception: it is always at
-        least ``SMALLEST_STEP_S`` after the last timestamp of the same kind of reading, even if it
-        is then later than ``now``.
+        In any case, the timestamp is at least ``SMALLEST_STEP_S`` after the last one of the same
+        kind of reading.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

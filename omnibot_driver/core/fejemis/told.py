@@ -2,8 +2,7 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-A notice that stops the robot is passed on each time, so that the robot stops each time. If its text
-was shown in the last 10 s, the notice has an empty text.
+A repeated notice that stops the robot is passed on with an empty text, so that the robot stops.
 """
 
 import math

@@ -44,9 +44,9 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 PERIOD_S: Final = 0.03
-"""Limit, in s, for the age of the last IMU sample when an orientation arrives. The driver publishes
-each orientation together with the last IMU sample. If the age of this sample is as long as the
-limit or longer, the orientation is discarded."""
+"""Age of the last IMU sample, in s, from which an orientation is discarded. Younger samples are
+published together with the orientation.
+"""
 
 
 class Translation:
@@ -149,8 +149,8 @@ class Translation:
     def settle(self, clock: TeensyClock, now: float) -> None:
         """Add the waiting IMU samples and orientations to the readings, in order of arrival.
 
-        If a sample must wait for a pose, this sample and everything after it stay in the queue. The
-        caller calls this method after a pose and at the end of a read.
+        A sample that must wait for a pose stays in the queue, with all later items. Call this
+        method after a pose and at the end of a read.
         """
         for item in self._pairs.take():
             if isinstance(item, Pair):

@@ -19,16 +19,14 @@ NO_ANGLE_S: Final = 0.25
 """Time in s without an angle of the front wheel, after which brush and lift are switched off."""
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
-"""Time limit in s, from the opening of the ports, for the first data of both boards.
-
-If one board is still silent after this time, and the other board sends, the driver notifies the
-user that the silent board is missing.
+"""Time in s, from the opening of the ports, after which a silent board is reported as missing if
+the other board sends.
 """
 UNREAD_S: Final = 0.03
-"""Longest time in s for which the driver normally reads no line of either board.
+"""Longest usual time in s without a line of either board; each sends at least every 15 ms.
 
-Each board sends at least every 15 ms. After a longer time, the driver has read late, or both boards
-are disconnected, so no single board is blamed for the missing data.
+After a longer time, no single board is blamed for missing data: the driver has read late, or both
+boards are disconnected.
 """
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
@@ -41,10 +39,8 @@ SLACK_S: Final = 1e-6
 class Watch:
     """The timeouts of a Fejemis: for each board's data, for the front wheel's angle, for the pose.
 
-    ``blind``: whether the last angle of the front wheel is too old, or the wheel's sensor is
-    faulty.
-
-    ``unposed``: whether the last pose is too old.
+    * ``blind``: whether the front wheel's last angle is too old, or its sensor is faulty.
+    * ``unposed``: whether the last pose is too old.
     """
 
     def __init__(self, ports: Ports, front: FrontWheel, told: Told) -> None:
@@ -71,8 +67,7 @@ class Watch:
     def look(self, now: float, *, driving: bool) -> bool:
         """Check all timeouts, and add a notice about each that has newly expired.
 
-        Driving requires one data stream from each board. Return whether this call finds that such a
-        stream has stopped.
+        Return whether a data stream that driving requires has newly stopped.
         """
         self._look_at_reads(now)
         if self._stalled:
@@ -135,8 +130,8 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        If so, the driver may be late, and the boards' data may wait to be read. In the next
-        ``OLDEST_S``, the driver reads this data, and blames neither board for missing data.
+        Data may then wait to be read. So neither board is blamed for missing data in the next
+        ``OLDEST_S``.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

@@ -2,10 +2,8 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-At rest, displacements are almost zero and readings hardly vary. If no displacements arrive, a
-steady turn looks like rest, so a large bias is not accepted.
-
-This module knows readings and times; it does not read a clock, and does not know when to measure.
+Without displacements, a steady turn looks like rest, so a large bias is not accepted. Time is an
+argument.
 """
 
 import math
@@ -21,18 +19,14 @@ BLOCK_S: Final = 1.0
 GAP_S: Final = 0.2
 """Longest allowed time between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
-"""Time in s within which a request is answered.
-
-A call of ``~/calibrate_gyro`` can take at most five seconds. The driver needs the rest of this time
-to write the result to a file.
+"""Time in s within which a request is answered. ``~/calibrate_gyro`` can take at most five seconds;
+the rest is for the writing of a file.
 """
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
-"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations of gyro and accelerometer readings,
-in rad/s and m/s², that are accepted as rest.
-
-They are ten times the sensors' noise. A robot that is touched exceeds them.
+"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations of gyro and accelerometer readings
+at rest, in rad/s and m/s². They are ten times the sensors' noise; a touched robot exceeds them.
 """
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
@@ -47,10 +41,9 @@ corrected in 14 s."""
 
 
 class Look:
-    """One observation of the robot: readings of the IMU, and displacements in the same period.
+    """One observation of the robot: IMU readings, and displacements in the same period.
 
-    * ``began_s``, ``last_s``: stamps of the first and the last reading, in s; NaN without
-      readings.
+    ``began_s``, ``last_s``: stamps of the first and the last reading, in s; NaN without readings.
     """
 
     def __init__(self) -> None:

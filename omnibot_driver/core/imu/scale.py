@@ -43,9 +43,9 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuScale:
-    """The conversion for one range of the accelerometer and one range of the gyro.
+    """The conversion for one range of the accelerometer and one of the gyro.
 
-    The ranges are 2, 4, 8 or 16 g, and 250, 500, 1000 or 2000 degrees per second.
+    Possible ranges: 2, 4, 8 or 16 g, and 250, 500, 1000 or 2000 degrees per second.
     """
 
     accel_range_g: int = 2
