@@ -43,16 +43,14 @@ RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
 """Time in s after which a reset is repeated.
 
-It is long enough for stopped wheels to come to rest, and for two tick reports to arrive.
-
-After ``UNPROVED_S``, the driver accepts small counts without a proof of the reset. But small counts
-that stay the same, although a reset would set them to zero, show that the board has not obeyed.
-With such counts, each repetition restarts ``UNPROVED_S``. After the last repetition, the driver
-gives the reset up before ``UNPROVED_S`` has passed.
+In this time, stopped wheels come to rest, and two tick reports arrive. If unchanged small counts
+show that the board has not obeyed, the repetition restarts ``UNPROVED_S``: without a repetition,
+small counts would then count as success.
 """
 STEADY_S: Final = 0.3
-"""Time in s. If the tick counts do not change for this time, the wheels are regarded as at rest.
-With the period that the board has after a boot, 0.4 s, one unchanged report is enough."""
+"""Time in s without a change of the tick counts after which the wheels are regarded as at rest.
+With the period after a boot, 0.4 s, one unchanged report is enough.
+"""
 
 
 class LoisEcuBoard(Board):
@@ -108,17 +106,16 @@ class LoisEcuBoard(Board):
     def reset_refusal(self) -> str:
         """Reason why a reset is refused; empty if a reset is allowed.
 
-        A reset is refused in a terminal mode. In this mode the board sends no ticks, so the driver
-        could not confirm the reset.
+        In a terminal mode, the board sends no ticks, so a reset could not be confirmed.
         """
         return self._ecu.reset_refusal
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether both wheels are certainly at rest if the ticks do not change now.
+        """Whether unchanged ticks would show that both wheels are at rest.
 
         The public firmware counts a wheel's ticks only while the RPM target of this wheel is
-        positive. At other times, unchanged ticks do not show whether the wheels are at rest.
+        positive.
         """
         return self._ecu.translation.odometry.counting
 
@@ -237,8 +234,7 @@ class LoisEcuBoard(Board):
     def due(self, now: float) -> Packets:
         """Return the lines to write now.
 
-        These lines have different purposes. They write settings or modes, request a date or a
-        record, repeat a reset, release a ball (``distribute_ball``), or command RPM 0/0 after a
+        They write settings or modes, make requests, repeat a reset, or command RPM 0/0 after a
         Stop.
         """
         if self._leaving:
@@ -267,8 +263,8 @@ class LoisEcuBoard(Board):
     def encode(self, order: Order) -> Packets:
         """Return the lines that command ``order``.
 
-        Raises CommandRefused for a goal pose. In a terminal mode, or while the mode changes, it
-        raises CommandRefused for any motion, too.
+        Raises CommandRefused for a goal pose, and for any motion in a terminal mode or during a
+        change of mode.
         """
         match order:
             case Drive(twist):
@@ -286,10 +282,7 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop. The board may have received a part of a line before.
-
-        The ``:`` at the beginning of Stop makes the board discard this part.
-        """
+        """Return Stop. Its first character ``:`` makes the board discard an incomplete line."""
         return self.stop()
 
     def stop(self) -> Packets:
@@ -304,11 +297,10 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and the reset command. Return nothing while ``due`` repeats an earlier reset.
+        """Return Stop and the reset command; return nothing while ``due`` repeats an earlier reset.
 
-        ``due`` repeats both lines until one of three things happens: the ticks show that the board
-        has obeyed the reset, the driver gives the reset up, or the robot drives. In total, both
-        lines are sent at most ``RESETS`` times.
+        ``due`` repeats both lines until the ticks prove the reset, the driver gives it up, or the
+        robot drives. They are sent at most ``RESETS`` times.
         """
         if self._reset_proof is not None and not (self._reset_shown or self._leaving):
             return NO_PACKETS
@@ -346,8 +338,8 @@ class LoisEcuBoard(Board):
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record. A later reading contains the record, or the reason why there is none.
 
-        Raises RequestRefused if the board cannot complete a record of this length. Also raises
-        RequestRefused while the board is in a terminal mode, or changes its mode.
+        Raises RequestRefused if the record is too long for the board, or in a terminal mode or
+        during a change of mode.
         """
         self._ecu.record(kind, samples)
 

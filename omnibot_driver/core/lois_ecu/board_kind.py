@@ -3,11 +3,9 @@
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
 - Public firmware: an odometry report follows each tick report, with the same command byte (0x12).
-  Ticks count only while a wheel is commanded forward.
+Ticks count only while a wheel is commanded forward.
 
 - Manual: odometry reports have their own command byte (0x20). Ticks count in both directions.
-
-This module works on changes of the counts and on the order of the reports.
 """
 
 from typing import Final
@@ -19,9 +17,8 @@ from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 LONE_TICKS: Final = 2
 """Number of tick reports after which an odometry report can show the kind of the board.
 
-An odometry report with its own command byte (0x20) shows that the board works as in the manual. It
-shows nothing if the board has sent one with the command byte of a tick report (0x12) before, or if
-the driver has found that the board counts ticks only forward.
+With its own command byte (0x20), the report shows a board as in the manual, unless earlier data
+have shown the public firmware.
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
@@ -29,10 +26,10 @@ count decreases, the driver decides that the board does not count ticks backward
 
 
 class BoardKind:
-    """The kind of one board. What is detected is written into the motion filter ``motion``.
+    """The kind of one board. The detected properties are written into the motion filter ``motion``.
 
-    ``appends``: whether an odometry report with the command byte of a tick report (0x12) follows
-    each tick report. The public firmware sends such reports.
+    ``appends``: whether an odometry report with the command byte 0x12 follows each tick report, as
+    in the public firmware.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -69,12 +66,10 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        The driver looks at each wheel that is commanded backward. The board's odometry shows how
-        far this wheel rolls backward, and the driver adds up these distances. If the sum exceeds
-        ``UNCOUNTED_M`` and no count has ever decreased, the board counts only forward.
+        It does if wheels that are commanded backward roll ``UNCOUNTED_M`` by the board's odometry,
+        and no count has ever decreased.
 
-        ``told``: changes in the board's odometry since the previous odometry report; None if
-        unknown.
+        ``told``: changes in the board's odometry since the previous report; None if unknown.
         """
         if told is None or not self._motion.signed or self._seen_signed:
             return

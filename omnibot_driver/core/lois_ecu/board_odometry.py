@@ -2,10 +2,8 @@
 
 """Changes from one odometry report (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware reports whole RPM. It has a defect: the reported position stays the same while
-both wheels have the same speed.
-
-This module works on odometry reports, without their times.
+The public firmware reports whole RPM. By a defect, its position stays the same while both wheels
+have the same speed.
 """
 
 import math
@@ -22,15 +20,11 @@ MOST_RPM: Final = 150.0
 class Told:
     """Changes between two consecutive odometry reports (0x20).
 
-    ``turned_m``: how much farther the right rim moved than the left one, in m.
-
-    ``along_m``: distance that the middle of the axle moved, in m.
-
-    ``still``: whether both reports have the same pose. ``same_velocity``: whether both have the
-    same velocity.
-
-    ``speeds_mps``: speeds of the left and right rim in the later report, in m/s. None if a speed
-    is not a whole number of RPM.
+    * ``turned_m``: how much farther the right rim moved than the left one, in m.
+    * ``along_m``: distance that the middle of the axle moved, in m.
+    * ``still``, ``same_velocity``: whether both reports have the same pose, and the same velocity.
+    * ``speeds_mps``: later speeds of the left and right rim, in m/s; None if a speed is not a whole
+      number of RPM.
     """
 
     turned_m: float

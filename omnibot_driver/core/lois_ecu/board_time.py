@@ -2,11 +2,8 @@
 
 """Estimation of the delay with which each tick report was read.
 
-A tick report contains the board's time, which is compared with the arrival time. Two models of the
-board's clock are fitted. In one, the clock always runs (manual). In the other, it stops while the
-board sends (public firmware).
-
-Input: clock counts, numbers of sent lines and arrival times; output: delays in s.
+The board's time in the report is compared with the arrival time, for two models of the board's
+clock: it always runs (manual), or it stops while the board sends (public firmware).
 """
 
 import math
@@ -20,8 +17,9 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored tick reports. They usually cover five seconds. In this time, a clock error of
-100 ppm changes the delay by 0.5 ms."""
+"""Number of stored tick reports, usually of five seconds: 100 ppm of clock error then change the
+delay by 0.5 ms.
+"""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s. A longer delay means that the board has restarted, or that its
@@ -34,9 +32,9 @@ SAME_READ_S: Final = 0.02
 """Tick reports that arrive within this time in s were probably read together, and late. Only
 the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
-"""Margin in s. The delay of a tick report is irregular in two cases: the report is earlier than the
-fitted clock by more than this margin, or its delay exceeds the largest recent delay by more than
-this margin."""
+"""Margin in s. The delay of a tick report is irregular if the report is earlier than the fitted
+clock, or its delay longer than the largest recent one, by more than this margin.
+"""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -56,9 +54,9 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """How far the board's clock has fallen behind since the first tick report, in s: the change
-        of the arrival time minus the change of the board's time. First value: if the board's clock
-        always runs. Second value: if it stops while the board sends."""
+        """How far the board's clock has fallen behind since the first tick report, in s. First
+        value: if the clock always runs. Second value: if it stops while the board sends.
+        """
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -77,20 +75,17 @@ class BoardTime:
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         """Return the delay in s, at least 0, of ticks that arrive at ``now``.
 
-        The time of the ticks is ``now`` minus the delay. From call to call, the time of the ticks
-        never decreases.
+        ``now`` minus the delay never decreases from call to call.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
         return late_s
 
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
-        """Return the delay of a tick report in s, and whether this delay is irregular.
+        """Return the delay of a tick report in s by the fitted clock, and whether it is irregular.
 
-        The delay is relative to the fitted clock; a negative delay means that the report came
-        early. A delay is irregular if a late read cannot explain it: it is clearly negative, or
-        much larger than all recent delays. While too few reports are stored, return 0 and False.
-        This method does not store the report.
+        A late read cannot explain an irregular delay. A negative delay means that the report came
+        early. While too few reports are stored, return 0 and False. This report is not stored.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -11,10 +11,8 @@ from typing import Final
 
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""Deceleration of a wheel without power by dry friction, in m/s².
-
-It comes in addition to an exponential decay of the speed. ``COASTING_S`` is the time constant of
-this decay, in s.
+"""Deceleration of a wheel without power by dry friction, in m/s². In addition, its speed decays
+exponentially, with the time constant ``COASTING_S``, in s.
 """
 COAST_PART: Final = 0.35
 """Assumed standard deviation of the deceleration, as a fraction of the deceleration."""
@@ -24,10 +22,9 @@ COAST_PART: Final = 0.35
 class Coasting:
     """A wheel that coasts after a command.
 
-    ``heard_s``: time in s at which the board reads the command. The power ends at the next step of
-    the speed controller.
-
-    ``speed_mps``: speed at this time, with sign.
+    * ``heard_s``: time in s at which the board reads the command. The power ends at the speed
+      controller's next step.
+    * ``speed_mps``: speed at this time, with sign.
     """
 
     heard_s: float
@@ -36,9 +33,8 @@ class Coasting:
     def unsure_mps(self, now: float, step_s: float) -> float:
         """Return the standard deviation of the speed at ``now``, with the sign of the speed.
 
-        It is half the difference between the speeds of two assumed wheels. One loses its power at
-        once and decelerates fast. The other one loses its power after ``step_s``, the period of the
-        speed controller, and decelerates slowly.
+        It is half the difference between two extreme cases: a wheel that loses its power at once
+        and brakes hard, and one that loses it after ``step_s`` and brakes gently.
         """
         age_s = now - self.heard_s
         slow_mps = self._speed_after((1 + COAST_PART) * age_s)

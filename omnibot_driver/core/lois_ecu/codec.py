@@ -2,7 +2,7 @@
 
 """Encoding of all messages as lines, and decoding of commands and of reports with only one line.
 
-Sources: the ECU's manual; the public firmware for the order of words within a payload.
+Sources: the ECU's manual; for the order of words in a payload, the public firmware.
 """
 
 from collections.abc import Callable
@@ -60,11 +60,10 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One kind of command: its command byte, its class, and its conversion to bytes and back.
+    """One kind of command, with its command byte and class.
 
-    ``payload``: converts the fields of a command to a payload.
-
-    ``command``: converts a payload to a command.
+    * ``payload``: converts the fields of a command to a payload.
+    * ``command``: converts a payload to a command.
     """
 
     code: Code

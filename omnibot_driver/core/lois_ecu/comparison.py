@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Correction of the motion filter: comparison of each report with the filter's expectation.
+"""Correction of the motion filter by the board's reports.
 
-While the board counts a wheel's ticks, the count is compared. Otherwise, the changes in the board's
-odometry (0x20) are compared.
-
-This module works on counts and on changes of the board's odometry, without the robot's pose.
+While the board counts a wheel's ticks, the count is compared with the filter. Otherwise, the
+changes in the board's odometry (0x20) are compared.
 """
 
 import math
@@ -38,27 +36,29 @@ of the tick report."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""Variances, in squared ticks, of the errors of three values that the board reports.
-
-``TICK_VARIANCE``: a tick count. ``TURN_VARIANCE``: the heading in the board's odometry (0x20).
-``ALONG_VARIANCE``: the distance in the board's odometry.
+"""``TICK_VARIANCE``, ``TURN_VARIANCE``, ``ALONG_VARIANCE``: variances, in squared ticks, of the
+errors of a tick count, and of the heading and the distance in the board's odometry (0x20).
 """
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Limit, in ticks, of the difference between a reported and an expected count. Above this limit,
-the wheel does not keep its speed, so the filter allows for larger changes of the speed."""
+"""Difference, in ticks, between a reported and an expected count, above which the wheel does not
+keep its speed. The filter then allows for larger changes of the speed.
+"""
 UNFORESEEN: Final = 5.0
-"""Limit, in standard deviations, of the difference between a reported and an expected count. A
-motion of the wheel cannot explain a larger difference. The difference is a sign of a restart of the
-board only if the counts are near zero and the clock is irregular."""
+"""Difference, in standard deviations, between a reported and an expected count, above which no
+motion can explain it. It may be a sign of a restart, if the counts are near zero and the clock is
+irregular.
+"""
 SAME_TICKS: Final = 0.6
-"""An unchanged count corrects the filter only if the expected count differs from it by at least
-this number of ticks. With a smaller difference, the next tick may not be due yet."""
+"""Difference, in ticks, from the expected count, from which an unchanged count corrects the filter.
+Below it, the next tick may not be due yet.
+"""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): limits of the difference
-between the reported and the expected heading. If both are exceeded, the report is ignored, because
-the board has computed the heading from an outdated wheel speed."""
+"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a report is ignored if its
+heading differs by more than both from the expected one. The board has then used an outdated wheel
+speed.
+"""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
@@ -67,20 +67,22 @@ SWINGING_M: Final = 0.055
 ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's x, and of its y, after a wheel has rolled 1 m at an
-oscillating speed. The error of the wheel's own distance (``SWINGING_M``) is separate."""
+oscillating speed, in addition to ``SWINGING_M``.
+"""
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviations of the error in a wheel's distance that lost reports cause, as fractions of
-the distance that the wheel rolls while reports are lost. First value: at a steady speed. Second
-value: at an oscillating speed. Only a wheel without counted ticks has this error."""
+"""Standard deviations of a wheel's distance after lost reports, as fractions of the distance that
+the wheel rolls meanwhile: at a steady and at an oscillating speed. Only for a wheel without counted
+ticks.
+"""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""The board's odometry (0x20) corrects a wheel's distance. If a correction is larger than
-``CORRECTED_TICKS``, an error remains: the filter is linear, and the start of a wheel is not. The
-standard deviation of this error is ``CORRECTED_PART`` times the excess over ``CORRECTED_TICKS``.
-Only a wheel without counted ticks has this error."""
+"""After the board's odometry (0x20) has corrected a wheel's distance by more than
+``CORRECTED_TICKS``, the filter adds an error. Its standard deviation is ``CORRECTED_PART`` times
+the excess. Only for a wheel without counted ticks.
+"""
 LATE_PART: Final = 0.6
-"""Error in a wheel's distance that a late report causes: standard deviation, as a fraction of the
-distance that the wheel rolls during the delay. Only a wheel without counted ticks has this error.
+"""Standard deviation of a wheel's distance after a late report, as a fraction of the distance that
+the wheel rolls during the delay. Only for a wheel without counted ticks.
 """
 EQUAL_RPM: Final = 3.0
 """Standard deviation, in RPM, of the difference between the true speeds of the two wheels when the
@@ -115,12 +117,11 @@ class Comparison:
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
-        Also return whether the difference is too large to be an error of the filter. The difference
-        is 0 while the board does not count. This method does not correct the filter.
+        Also return whether the difference is too large for an error of the filter. While the board
+        does not count, the difference is 0. The filter is not corrected.
 
-        ``ticks``: reported ticks since the last report.
-
-        ``late_s``: how much later than usual the report arrived.
+        * ``ticks``: reported ticks since the last report.
+        * ``late_s``: how much later than usual the report arrived.
         """
         motion = self._motion
         wheel, speed = motion.wheels[index], motion.speed_mps(index)
@@ -135,11 +136,10 @@ class Comparison:
         return residual / motion.tick_m, residual**2 > UNFORESEEN**2 * unsure
 
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
-        """Correct the motion filter by ``ticks``: the ticks that the board has newly counted.
+        """Correct the motion filter by ``ticks``, the newly counted ticks of a wheel.
 
-        ``duration_s``: time since the last report.
-
-        ``late_s``: how much later than usual the report with these ticks arrived.
+        * ``duration_s``: time since the last report.
+        * ``late_s``: how much later than usual the new report arrived.
         """
         motion, estimate = self._motion, self._motion.filter
         wheel, tick_m = motion.wheels[index], motion.tick_m
@@ -183,9 +183,8 @@ class Comparison:
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
         """Correct the motion filter by the changes in the board's odometry (0x20).
 
-        ``duration_s``: time since the last report of this odometry.
-
-        ``late_s``: how much later than usual the new report arrived.
+        * ``duration_s``: time since the last report of this odometry.
+        * ``late_s``: how much later than usual the new report arrived.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
@@ -238,9 +237,9 @@ class Comparison:
         self._speeds[index].come_to_rest()
 
     def _equal(self, told: Told, shown: tuple[float, float]) -> bool:
-        """Return whether both wheels have the same speed, so that the board does not report it.
+        """Return whether both wheels have the same speed, which the board then does not report.
 
-        ``shown``: for each wheel, the estimate of the speed that the board measured last, in m/s.
+        ``shown``: for each wheel, the estimate of its last measured speed, in m/s.
         """
         left, right = (wheel.course.measured_sign for wheel in self._motion.wheels)
         differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * self._motion.rpm_mps
@@ -266,8 +265,8 @@ class Comparison:
     def _no_tick(self, duration_s: float, ticks: float) -> None:
         """Correct the filter's wheel speeds towards zero: the board's odometry shows no tick.
 
-        ``ticks``: standard deviation of a wheel's distance since the last report, in ticks. A wheel
-        whose speed the firmware does not measure is not corrected.
+        ``ticks``: standard deviation of a wheel's distance since the last report, in ticks. Speeds
+        that the firmware does not measure are not corrected.
         """
         motion = self._motion
         self.begin_odometry()

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversation with a LOIS ECU. It decodes received lines, and encodes orders as lines.
+"""Conversation with a LOIS ECU: decodes received lines, and encodes orders as lines.
 
-The odometry depends on the commands. Therefore ``wrote`` must be called for all bytes that are sent
-to the board.
+The caller must call ``wrote`` for all sent bytes, because the odometry depends on the commands.
 """
 
 from collections.abc import Sequence
@@ -192,8 +191,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Two kinds of tick reports do not show a standstill: old ones, and those that the public
-        firmware sends after a backward command or RPM 0/0.
+        Old reports do not show it, nor those of the public firmware after a backward command or RPM
+        0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -245,13 +244,10 @@ class LoisConversation:
     # Outbound
 
     def due(self, now: float, *, proved: bool = True) -> bytes:
-        """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
+        """Return the lines to write now. Called at the time ``wake_at``.
 
-        Called at the time ``wake_at``.
-
-        ``proved``: whether displacements have proved that the robot stands still. A change of mode
-        that needs a standstill waits for this proof. After 2 s of Stop, the mode is changed without
-        the proof: in a terminal mode, the board sends no displacements.
+        ``proved``: whether displacements have proved a standstill. A change of mode waits for this
+        proof, but only for 2 s of Stop: in a terminal mode, no displacements arrive.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal
@@ -283,24 +279,23 @@ class LoisConversation:
         """Return the set-points RPM 0/0; in a terminal mode, return no bytes.
 
         In a terminal mode, the public firmware reads at most 480 characters a second, so the
-        set-points would delay the Stop. For this reason, the driver sends only the Stop (``stop``)
-        in this mode.
+        set-points would delay Stop.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
 
-        Return Stop if the velocity rounds to zero. Raises CommandRefused if the robot must not move
-        because of a terminal mode or a change of mode.
+        If the velocity rounds to zero, return Stop. Raises CommandRefused for a motion in a
+        terminal mode or during a change of mode.
         """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Return the lines that command the rates of the left and right wheel, in rad/s.
 
-        Return Stop if both rates round to zero. Raises CommandRefused if the robot must not move
-        because of a terminal mode or a change of mode.
+        If both rates round to zero, return Stop. Raises CommandRefused for a motion in a terminal
+        mode or during a change of mode.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")

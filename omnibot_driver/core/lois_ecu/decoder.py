@@ -2,8 +2,8 @@
 
 """Decoder that turns a stream of bytes into reports.
 
-A line begins at the last ``:`` before its line feed. The decoder stores fewer than ``LONGEST_LINE``
-bytes of an unfinished line. The module reads no clock, and no input raises an error.
+A line begins at the last ``:`` before its line feed. The module reads no clock, and no input raises
+an error.
 """
 
 from dataclasses import dataclass, field
@@ -25,11 +25,10 @@ accepted again."""
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counters of a decoder. After a reconnection, the next decoder continues the same counters.
+    """Counters of a decoder, which continue after a reconnection.
 
-    ``lines``: number of valid lines.
-
-    ``faults``: number of discarded pieces of input. Such a piece was not a valid line.
+    * ``lines``: number of valid lines.
+    * ``faults``: number of discarded pieces of input.
     """
 
     lines: int = 0
@@ -41,16 +40,11 @@ class DecoderStatistics:
 class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
-    ``sum_required``: whether lines without a checksum are discarded. If False, they are discarded
-    only while the board sends lines with a checksum: a line that loses two characters is as long as
-    a line without a checksum, and its value would be wrong.
-
-    ``ticks_gate``: check of the tick reports.
-
-    ``terminal``: whether text that is not a line of the protocol is regarded as a sensor's line. If
-    False, such text counts as damage.
-
-    ``times``: for each report of the last call, the time in s at which its last line arrived.
+    * ``sum_required``: whether lines without a checksum are always discarded. If False, they are
+      discarded only while the board sends checksums: such a line may be damaged.
+    * ``ticks_gate``: check of the tick reports.
+    * ``terminal``: whether text outside the protocol is regarded as a sensor's line, not as damage.
+    * ``times``: for each report of the last call, the arrival time of its last line, in s.
     """
 
     def __init__(self, *, sum_required: bool = True, ticks_per_revolution: int = 60) -> None:
@@ -69,8 +63,7 @@ class LoisDecoder:
     def statistics(self) -> DecoderStatistics:
         """Counters of lines, faults and groups.
 
-        A new decoder can continue the counters of an earlier one. To do this, assign the earlier
-        decoder's counters to this property before the first ``feed``.
+        To continue the counters of an earlier decoder, assign them before the first ``feed``.
         """
         return self._statistics
 
@@ -105,8 +98,8 @@ class LoisDecoder:
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
         """Expect a record, and discard all other records.
 
-        ``left``, ``right``: number of samples of the left and the right wheel in the record. For
-        headings, ``left`` is the number of headings, and ``right`` is 0.
+        ``left``, ``right``: number of samples of each wheel; for headings, ``left`` is their
+        number, and ``right`` is 0.
         """
         self._assembler.expect_record(kind, left, right)
 
@@ -117,9 +110,8 @@ class LoisDecoder:
     def feed(self, data: bytes, now: float) -> list[Report]:
         """Return the reports that ``data`` completes, in the order in which the board sent them.
 
-        While the driver cannot tell whether a report of several lines is complete, the report is
-        held back until the next line. With empty ``data``, it is returned if no line has come for
-        long enough.
+        A report that may be incomplete is held back until the next line. After a silence, a call
+        with empty ``data`` returns it.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))

@@ -29,8 +29,7 @@ class Estimates:
     """The estimates of one robot. Pairs of values are for the left and the right wheel.
 
     * ``pose``: pose of the last estimate.
-    * ``heading_compared``: whether the board's odometry has corrected the heading since the last
-      estimate.
+    * ``heading_compared``: whether the board's odometry has corrected the heading since then.
     * ``late_stddev_s``: standard deviation of the timestamps, in s.
     """
 
@@ -59,9 +58,7 @@ class Estimates:
     def conclude(self, at_s: float, may_roll_mps: tuple[float, float]) -> FusedOdometry:
         """Return the estimate at ``at_s``, the time of the filter's state, and store its pose.
 
-        The displacement of the next estimate begins at the stored pose.
-
-        ``may_roll_mps``: see ``now``.
+        The next displacement begins at the stored pose. ``may_roll_mps``: see ``now``.
         """
         motion = self._motion
         blind = [wheel.blind and not motion.signed for wheel in motion.wheels]
@@ -88,11 +85,10 @@ class Estimates:
     def now(
         self, stamp_s: float, unheard_s: float, may_roll_mps: tuple[float, float]
     ) -> FusedOdometry:
-        """Return the estimate at ``stamp_s``. This call has no effect on later estimates.
+        """Return the estimate at ``stamp_s``, without an effect on later estimates.
 
-        ``unheard_s``: time in s between the time of the filter's state and ``stamp_s``.
-
-        ``may_roll_mps``: greatest possible speed of each wheel during ``unheard_s``, in m/s.
+        * ``unheard_s``: time in s from the filter's state to ``stamp_s``.
+        * ``may_roll_mps``: greatest possible speed of each wheel in this time, in m/s.
         """
         motion = self._motion
         mean = motion.filter.mean

@@ -2,10 +2,8 @@
 
 """History of the states of a filter.
 
-If the driver notices a restart of the board late, the filter returns to its state before the
-restart.
-
-This module works on states and times. It does not know what a state means.
+After a restart of the board that was noticed late, the filter returns to an earlier state. This
+module does not know what a state means.
 """
 
 from collections import deque
@@ -35,11 +33,10 @@ class FilterHistory:
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """Restore the last state that was stored at ``then_s`` or earlier.
+        """Restore the last state that was stored at ``then_s`` or earlier, or else the oldest
+        state.
 
-        If all stored states are later, restore the oldest state.
-
-        Return the time in s at which the restored state was stored. None if no state is stored.
+        Return the time in s at which this state was stored; None if no state is stored.
         """
         if not self._kept:
             return None

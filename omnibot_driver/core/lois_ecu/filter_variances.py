@@ -29,10 +29,8 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: for the left and right wheel, the standard deviation of the speed that arises
-    because it is unknown when and how fast the wheel decelerates. The sign gives the direction in
-    which the wheel rolls: both wheels have the same error of the time, so their errors add up or
-    cancel.
+    ``coasting_mps``: for each wheel, the standard deviation of its speed from the unknown
+    deceleration. The sign is the wheel's direction: the errors of both wheels are fully correlated.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

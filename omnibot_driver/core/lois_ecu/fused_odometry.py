@@ -21,14 +21,11 @@ compass.
 class FusedOdometry:
     """Estimated odometry of the robot at the time ``stamp_s``.
 
-    ``pose``, ``covariance``: in the odometry frame. ``twist``: in the body frame.
-
-    ``twist_covariance``: variances in (m/s)² and (rad/s)².
-
-    ``displacement``: motion since the previous estimate, in the robot's axes at that estimate.
-
-    ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate,
-    computed with the wheel radius in the settings.
+    * ``pose``, ``covariance``: in the odometry frame.
+    * ``twist``: in the body frame.
+    * ``twist_covariance``: variances in (m/s)² and (rad/s)².
+    * ``displacement``: motion since the previous estimate, in the robot's axes at that estimate.
+    * ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate.
     """
 
     stamp_s: float

@@ -15,8 +15,8 @@ the date yet."""
 class GpsClock:
     """The date and the time that the GPS receiver reported last.
 
-    ``dated``: whether the last date that arrived is a real one. At midnight the date becomes
-    unknown, but this value does not change.
+    ``dated``: whether the last reported date is a real one. It stays the same at midnight, when the
+    date becomes unknown.
     """
 
     def __init__(self) -> None:
@@ -32,8 +32,8 @@ class GpsClock:
     def set_date(self, date: GpsDate) -> None:
         """Use a reported date.
 
-        Zeros and false years are rejected: the receiver sends them while it has no date. Dates from
-        2038 on are rejected because they do not fit into a ROS time.
+        * Zeros or a false year: the receiver has no date yet, so the date is unknown.
+        * From 2038 on: rejected, because such a date does not fit into a ROS time.
         """
         self.dated = bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
         self._date = date if self.dated else None

@@ -37,10 +37,8 @@ QUIET_S: Final = 0.05
 board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Factor for the longest allowed time between two lines of a group.
-
-This time is the factor times the time between the marker lines of this group and of the previous
-group with the same command byte, but at least ``QUIET_S`` and at most ``LATE_S``.
+"""Longest allowed time between two lines of a group, as a fraction of the time between the last two
+marker lines with its command byte. The limits are ``QUIET_S`` and ``LATE_S``.
 """
 
 # Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the
@@ -87,9 +85,9 @@ class Assembler:
 
     @property
     def resolves_at(self) -> float:
-        """Time in s at which the group that is held back is returned, if no further line comes.
+        """Time in s at which the held group is returned if no further line comes.
 
-        It is infinity if no group is held back, or if lines of the group may still be missing.
+        Infinity if no group is held, or if its lines may still be missing.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 

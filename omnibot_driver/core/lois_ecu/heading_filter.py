@@ -12,10 +12,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Factor that determines the largest accepted difference of a heading from the expected one.
-
-The largest accepted difference is ``NEAR_DEG + NEAR_PART * turn``, in degrees. ``turn`` is the
-change of the odometry's yaw since the last heading, in degrees.
+"""Factor in the largest accepted difference of a heading from the expected one, in degrees:
+``NEAR_DEG + NEAR_PART * turn``. ``turn``: change of the odometry's yaw since the last heading.
 """
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
@@ -89,9 +87,7 @@ class HeadingFilter:
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
     """Return the heading that is expected now, from -180 to 180 degrees.
 
-    It follows from an earlier heading and from the change of the yaw since then.
-
-    ``before``: this earlier heading in degrees, and the yaw in rad at that time.
+    ``before``: an earlier heading in degrees, and the odometry's yaw at that time in rad.
     """
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 

@@ -2,10 +2,7 @@
 
 """Times of reports that waited in the kernel's buffer because the computer read late.
 
-Such reports arrive together. Every tick report contains the time of the board's clock, which shows
-when the report was sent.
-
-Input: reports and their arrival times; output: the time of each report.
+Such reports arrive together. The board's time in each tick report shows when it was sent.
 """
 
 import math
@@ -18,14 +15,14 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Longest usual time in s without a report. If no report arrives for longer, and then several tick
-reports arrive together, they were read late, and their times are corrected. ``BoardTime`` handles
-shorter delays."""
+"""Longest usual time in s without a report. Several tick reports that then arrive together were
+read late, and their times are corrected. ``BoardTime`` handles shorter delays.
+"""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor, a little above 1, for the time between two reports that is computed from the board's
-clock. The rate of this clock is not known exactly. If every read is late, the computed times could
-fall behind the arrival times more and more; the factor prevents this."""
+"""Factor, a little above 1, for times that are computed from the board's clock. If its rate is not
+exact and every read is late, the times would otherwise fall more and more behind the arrivals.
+"""
 
 
 @value(frozen=True, slots=True)
@@ -38,9 +35,7 @@ class Heard:
 
 
 class LateReads:
-    """Times of the reports from one board.
-
-    The times never decrease. The time of a report is never later than its arrival.
+    """Times of the reports from one board. They never decrease, and never exceed the arrival times.
 
     ``ticks_per_revolution`` may be replaced at any time.
     """
@@ -49,24 +44,21 @@ class LateReads:
         self.ticks_per_revolution = ticks_per_revolution
         self._last: Heard | None = None
         self._waited = False
-        """Whether the last tick report was read late. If it was, the next reports may be late
-        too."""
+        """Whether the last tick report was read late. The next reports may then be late too."""
         self._unit: ClockUnit | None = None
         self._arrived_s = self._latest_s = -math.inf
         self._rates: deque[float] = deque(maxlen=RATES_KEPT)
-        """The last measured durations of one unit of the board's clock, in s. Each is the time
-        between two tick reports, divided by the change of the board's clock."""
+        """The last measured durations of one unit of the board's clock, in s."""
 
     def times(
         self, reports: list[Report], arrived: list[float], unit: ClockUnit | None
     ) -> list[float]:
         """Return the times in s of reports that were read together.
 
+        If a clock in ns may have wrapped or restarted, the result is the arrival times.
+
         * ``arrived``: for each report, the time in s at which its last line was read.
         * ``unit``: the unit of the board's clock; None if it is unknown at present.
-
-        If a clock in ns is near zero, either it has wrapped or the board has restarted. The clock
-        does not show which, so the arrival times are returned.
         """
         self._unit = unit or self._unit
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]
@@ -93,9 +85,8 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether this report was read late. Two signs together show this: no report
-          arrived for more than ``LATE_S`` before it, and later tick reports arrived together with
-          it.
+        * ``late``: whether this report was read late: none arrived for ``LATE_S`` before it, and
+          others arrived together with it.
         * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s
@@ -120,8 +111,8 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        After a restart, both the clock and the tick counts begin at zero. The clock alone proves
-        nothing: a clock in ns wraps to zero every 4.3 s even without a restart.
+        The clock and the tick counts then both begin at zero. The clock alone proves nothing: in
+        ns, it wraps every 4.3 s.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

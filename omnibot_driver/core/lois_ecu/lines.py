@@ -2,10 +2,8 @@
 
 """One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
 
-``:<command><payload><checksum>\\n`` has 14 characters. If the board expects no checksums, lines
-to it have 12. Lines from the board always have a checksum.
-
-This module knows the layout only, not what a command means.
+``:<command><payload><checksum>\\n`` has 14 characters. Only lines to a board without checksums have
+12.
 """
 
 import re
@@ -52,7 +50,7 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 
 
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
-    """Parse the characters of one line, from ``:`` to the line feed. None if they are not valid.
+    """Parse the characters of one line, from ``:`` to the line feed; None if they are not valid.
 
     A carriage return may precede the line feed. A wrong checksum is never valid.
     """

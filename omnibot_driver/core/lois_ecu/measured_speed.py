@@ -2,10 +2,8 @@
 
 """Prediction of the board's own odometry (0x20).
 
-The firmware measures a wheel's speed at each tick of the wheel, and computes its odometry from the
-last measured speeds. The motion filter calls this module in each step in which a wheel rolls.
-
-This module knows the states of the filter. It does not know the board's reports.
+The firmware computes its odometry from the wheel speeds that it measured at the last tick of each
+wheel. This module does not know the board's reports.
 """
 
 import math
@@ -31,11 +29,11 @@ START_STDDEV_TICKS: Final = 0.9
 that the board's odometry (0x20) misses each time a wheel starts."""
 FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses.
+"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses of a
+wheel faster than ``FAST_TICKS_PER_S``.
 
-The odometry misses motion of a wheel that is faster than ``FAST_TICKS_PER_S``: while the board
-sends data, it notices a tick late. If the next tick follows soon, the board does not measure the
-speed between the two ticks, so the odometry lacks this motion.
+While the board sends, it notices a tick late. It does not measure the speed up to the next tick if
+that follows soon.
 """
 
 

@@ -81,10 +81,9 @@ class Stream(IntEnum):
 class TerminalMode(IntEnum):
     """What the serial line between the board and the host carries.
 
-    ``HOST``: the protocol. ``HOST_WITHOUT_SUM``: the same, but lines from the host have no
-    checksum.
-
-    Other modes: data of a device at a serial input of the board.
+    * ``HOST``: the protocol.
+    * ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no checksum.
+    * Other modes: data of a device at a serial input of the board.
     """
 
     HOST = 0
@@ -265,8 +264,8 @@ class Heading:
 class Ticks:
     """Signed encoder ticks of both wheels since the board started or was reset.
 
-    ``time_counts``: sending time by the board's clock, modulo 2³². Its unit is ns according to the
-    manual, but ms in the public firmware.
+    ``time_counts``: sending time by the board's clock, modulo 2³², in ns (manual) or ms (public
+    firmware).
     """
 
     time_counts: int
@@ -276,12 +275,10 @@ class Ticks:
 
 @dataclass(frozen=True, slots=True)
 class BoardOdometry:
-    """The robot's pose and velocity, as the board computes them.
+    """The board's own pose and velocity of the robot, in a frame that is fixed to the floor.
 
-    Both are in a coordinate frame that is fixed to the floor. Velocities may be NaN or infinite.
-
-    ``appended``: whether the report began with the command byte of a tick report (0x12). The public
-    firmware sends it so. According to the manual, the byte is 0x20.
+    Velocities may be NaN or infinite. ``appended``: whether the command byte was 0x12, as in the
+    public firmware, not 0x20 (manual).
     """
 
     x_m: float
@@ -299,11 +296,9 @@ class Record:
 
     ``left``, ``right``: samples by wheel.
 
-    RPM: times between encoder ticks, in the unit ``record_request.COUNT_S``.
-
-    Torque: 12-bit values.
-
-    Headings: degrees, all in ``left``.
+    * RPM: times between encoder ticks, in the unit ``record_request.COUNT_S``.
+    * Torque: 12-bit values.
+    * Headings: degrees, all in ``left``.
     """
 
     kind: RecordKind

@@ -25,9 +25,9 @@ OWN_GAINS: Final = (
     " 0.04 m on average, by at most 0.16 m in nearly all drives, and by 2.2 m in one of 150. Run"
     " `calibrate step`, or set these parameters"
 )
-"""Advice if the user has not set all gains. The braces are replaced by the names of the missing
-gains. The errors in the text were measured in 150 forward drives, with a compiled build of the
-public firmware."""
+"""Advice if the user has not set all gains; the braces stand for their names. The errors were
+measured in 150 forward drives with the public firmware.
+"""
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
     "the tick counts change faster than a wheel can turn, so the driver rejects the tick reports,"
@@ -40,11 +40,13 @@ NO_TICKS_ADVICE: Final = (
     "the board sends other reports, but no ticks, so there is no odometry, and a stop cannot be"
     " confirmed; set `ticks_period`"
 )
-"""Advice if other reports came for ``NO_TICKS_S``, but no ticks. Another program may have turned
-the ticks off. Of the time between two reports, at most ``LONGEST_STEP_S`` counts."""
+"""Advice if other reports came for ``NO_TICKS_S``, but no ticks. Of the time between two reports,
+at most ``LONGEST_STEP_S`` counts.
+"""
 LOOK_AT: Final = 600
-"""Number of received bytes after which the user gets advice, if no valid line was among these
-bytes. The board sends at least 70 bytes per second, so the advice comes within 9 s."""
+"""Number of received bytes without a valid line after which the user gets advice. The board sends
+at least 70 bytes per second, so the advice comes within 9 s.
+"""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
 _NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")
@@ -54,12 +56,11 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all received bytes. Call ``understood`` each time when a report was decoded
-    from these bytes, and ``heard`` with the reports.
+    Call ``look`` with all received bytes. For each decoded report, call ``understood`` and
+    ``heard``.
 
-    ``advice``: what the user should check; None while no misconfiguration is suspected.
-
-    ``no_ticks``: whether the board sends reports, but no ticks.
+    * ``advice``: what the user should check; None without a suspicion.
+    * ``no_ticks``: whether the board sends reports, but no ticks.
     """
 
     def __init__(self) -> None:

@@ -1,11 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kalman filter of both wheels' motion, and of the values that the board reports about it.
+"""Kalman filter of both wheels' motion, and of the values that the board reports.
 
 The wheels are assumed to have the radius in the settings. Left and right are those of the board.
-
-Input: commands to the board, and values that the firmware counts or measures. This module does not
-know the reports in which these values arrive.
 """
 
 import math
@@ -40,8 +37,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts. If more time has passed, only the last
-``LONGEST_STEP_S`` are predicted."""
+"""Longest time in s that one call of ``advance`` predicts: the last part of a longer time."""
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
@@ -60,20 +56,18 @@ EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
 """Standard deviation that is added to a wheel's excess when its set-point changes.
 
-The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
-``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess.
-
-Each of these constants has two values: for the board's own controller gains, and for the user's.
+The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point
+(``EXCESS_MEAN``, ``EXCESS_STDDEV``). First value: for the board's own controller gains. Second
+value: for the user's.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLS_S: Final = 0.1
 """Standard deviation of the distance that a wheel rolls after an RPM set-point has taken its power
-away, in m for each m/s of its speed. The motors and their friction are unknown."""
+away, in m per m/s. Motors and friction are unknown.
+"""
 REVERSES_S: Final = 0.2
-"""Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign.
-
-The board measures only how fast a wheel turns, not in which direction. So the driver does not know
-when the wheel has stopped and its direction changes.
+"""Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign. The
+board does not measure the direction of a wheel.
 """
 ROLLING_MPS: Final = 1e-6
 
@@ -81,15 +75,11 @@ ROLLING_MPS: Final = 1e-6
 class MotionFilter:
     """Estimate of the wheels' motion and the body's pose.
 
-    ``rpm_mps``: speed of a wheel's rim at one RPM.
-
-    ``turn_sign``: -1 if the board's left wheel is the robot's right wheel, otherwise 1.
-
-    ``signed``: whether ticks always count in both directions.
-
-    ``holds``: whether the board keeps the last measured speed of a wheel at rest.
-
-    ``tuned``: whether the user set the gains of the speed controllers.
+    * ``rpm_mps``: speed of a wheel's rim at one RPM.
+    * ``turn_sign``: -1 if the board's left wheel is the robot's right wheel, otherwise 1.
+    * ``signed``: whether ticks always count in both directions.
+    * ``holds``: whether the board keeps the last measured speed of a wheel at rest.
+    * ``tuned``: whether the user set the gains of the speed controllers.
     """
 
     def __init__(self) -> None:
@@ -102,10 +92,10 @@ class MotionFilter:
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
         """Smallest expected difference between the two measured wheel speeds, in m/s, since the
-        board's reported distance was last compared with the estimated one.
+        last comparison of the board's distance.
 
-        While both speeds are equal, the public firmware does not change the reported position. So a
-        small value shows that this may have happened.
+        At a small value, the public firmware may not have updated its position: it does not while
+        both speeds are equal.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
@@ -199,11 +189,9 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Increase the uncertainty of a wheel's distance, and of all states that depend on it.
 
-        ``stddev_m``: standard deviation to add to the distance.
-
-        ``counted``: whether the board counted the wheel's ticks at the time of the error. In this
-        case, the number of counted ticks becomes uncertain too, even if the board does not count
-        ticks now.
+        * ``stddev_m``: standard deviation to add to the distance.
+        * ``counted``: whether the board counted the wheel's ticks at the time of the error. The
+          count then becomes uncertain too.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -288,18 +276,18 @@ class MotionFilter:
     def _kind(self, index: int) -> str:
         """Return the kind of the command that a wheel follows: "rpm", "duty" or "stop".
 
-        A Stop is a duty too. It says nothing about the error of a speed, so the error that a duty
-        had stays until the next RPM set-point.
+        After a duty, a Stop is still "duty": it does not change the error of the speed.
         """
         course = self.wheels[index].course
         driven = course.target_mps or (self._kinds and self._kinds[index] == "duty")
         return course.kind if course.kind == "rpm" or driven else "stop"
 
     def _begin_biases(self, wheels: Sequence[int]) -> None:
-        """Reset the estimated speed errors (biases) of these wheels, which have another kind now.
+        """Reset the speed errors (biases) of these wheels, because the kind of their command has
+        changed.
 
-        In duty mode, a bias is a relative error of the speed. Otherwise, a bias is the amount by
-        which the firmware rounds down the measured speed, in m/s.
+        A bias is a relative error in duty mode. Otherwise, it is the amount by which the firmware
+        rounds down the measured speed, in m/s.
         """
         assert self._kinds is not None
         for index in wheels:
