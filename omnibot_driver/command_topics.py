@@ -30,10 +30,9 @@ def obeying(
     """Return a callback that passes each message to ``action``, and refuses old messages.
 
     * ``expires_s``: returns the age, in s, at which a command expires.
-    * ``may_be_old``: returns True for a message whose age does not matter.
-    * ``is_stop``: returns True for a command to stop; its age does not matter.
-    * ``ends_goal``: returns True for a command that ends a goal even if it is refused. May raise
-      CommandRefused for an invalid message.
+    * ``may_be_old``, ``is_stop``: return True if the age of a message does not matter.
+    * ``ends_goal``: returns True if a command ends a goal even when it is refused. May raise
+      CommandRefused.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()

@@ -2,8 +2,7 @@
 
 """The parameters that only a Fejemis has. This module must not use ROS.
 
-The robot's two boards store some of these values. While such a parameter is unset (the default),
-the driver does not write it.
+Values that the boards store are unset by default; the driver then does not write them.
 """
 
 import math

@@ -274,9 +274,8 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason for a refusal, or an empty string.
 
-        * ``what``: name of the topic or device.
-        * ``off``: whether the action switches a device off. The boards' state never prevents it.
-          The result is then a warning if a port is not open.
+        ``off``: whether to switch a device off. The boards' state never prevents it, but a closed
+        port gives a warning.
         """
 
         def say(session: Session, now: float) -> str:

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
+"""The LOIS ECU's own parameters. This module does not use ROS.
 
-The board stores some of these values. While such a parameter is unset (the default), the driver
-does not write it.
+Values that the board stores are unset by default; the driver then does not write them.
 """
 
 from collections.abc import Mapping

@@ -26,8 +26,7 @@ Row = tuple[object, ...]
 def table(reading: RecordReading) -> Iterator[Row]:
     """Yield the header of the file, then one row for each sample.
 
-    Headings are in degrees, clockwise from magnetic north. Torques have an unknown scale. An
-    unknown value is an empty string.
+    Headings are in degrees, clockwise from magnetic north. Unknown values are empty.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:

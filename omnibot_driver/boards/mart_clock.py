@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Decides when, and with which arguments, the command TIME may set the controller's clock.
+"""Decides when the command TIME may set the controller's clock.
 
-TIME sets a full minute and ignores the seconds. If it sets the clock back between two motions, the
-controller computes a wrong heading.
+If TIME sets the clock back between two motions, the controller computes a wrong heading.
 """
 
 import time
@@ -18,8 +17,7 @@ controller's clock is then at most 4 s fast.
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second (UTC) for TIME, or None if TIME must wait.
 
-    * ``now_s``: present time in s since 1970.
-    * ``may_set_back``: whether TIME may set the controller's clock back.
+    ``now_s``: present time in s since 1970.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

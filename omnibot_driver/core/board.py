@@ -45,10 +45,9 @@ class BoardFigures:
     * ``rates_hz``: expected rate of each kind of reading.
     * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
     * ``faults``: number of framing faults.
-    * ``discarded_bytes``: number of bytes that belong to no valid frame.
-    * ``saturated``: number of commands that exceeded the range of the board's encoding.
-    * ``odom_hz``: rate of the topic ``odom``; None: one message for each odometry reading.
-    * ``own``: figures that only this kind of board has, by label, e.g. its version.
+    * ``saturated``: number of commands beyond the range of the board's encoding.
+    * ``odom_hz``: rate of ``odom``; None: one message for each odometry reading.
+    * ``own``: figures that only this kind of board has, by label.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
@@ -89,8 +88,8 @@ class ReadingClock(Protocol):
 class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
-    Implement each method that has only a docstring. Requests such as ``pause`` raise RequestRefused
-    if the present mode forbids them.
+    Implement each method that has only a docstring. Requests such as ``pause`` may raise
+    RequestRefused.
     """
 
     traits: Traits
@@ -205,8 +204,8 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        They may be OdometryReadings, NoticeReadings and results of requests. Such readings do not
-        show that the board is alive.
+        OdometryReadings, NoticeReadings and results of requests do not show that the board is
+        alive.
         """
         return []
 
@@ -235,10 +234,9 @@ class Board(Protocol):
         """
 
     def start_requested(self) -> None:
-        """Record that the user has requested a start.
+        """Record that the user has requested a start; a call of ``start`` may follow.
 
-        A call of ``start`` follows if the board can be started. The driver's own starts, e.g. after
-        a reconnect, do not call this method.
+        The driver's own starts, e.g. after a reconnect, do not call this method.
         """
         return
 
@@ -288,8 +286,7 @@ class Board(Protocol):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the guard's packets for a hang of this process: without and with a latched e-stop.
 
-        The first item contains Stop; the second contains the emergency stop, then Stop. Called
-        after each input and before each output.
+        The first item contains Stop; the second contains the emergency stop, then Stop.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -28,8 +28,7 @@ class Notice:
 class Extra:
     """A measurement that only one kind of board makes; its profile publishes it.
 
-    ``stamp_s``: time of measurement, in s of the host's steady clock; not used for a RequestDone or
-    Unstamped.
+    ``stamp_s``: time of measurement, in s of the host's steady clock.
     """
 
     value: object

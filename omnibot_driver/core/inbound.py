@@ -52,8 +52,8 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes; return the IMU estimates to publish at once. Call ``process`` afterwards.
 
-        If the bytes change the mode of the board, ``hear`` also calls ``process``. The estimates
-        are then among the reporter's events, and the result is empty.
+        After a change of mode, ``hear`` itself calls ``process``, adds the estimates to the
+        reporter's events, and returns an empty list.
         """
         self._liveness.came_at = now
         before = self._board.mode

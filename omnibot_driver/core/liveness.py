@@ -13,8 +13,7 @@ from omnibot_driver.core.traits import Traits
 class Liveness:
     """The times at which a board last sent data, and the limits for its silence.
 
-    * ``heard_at``: arrival of the last reading, in s; also the start of a connection, or the end of
-      a stall.
+    * ``heard_at``: arrival of the last reading, start of the connection, or end of a stall, in s.
     * ``came_at``: arrival of the last bytes, valid or not, in s.
     """
 

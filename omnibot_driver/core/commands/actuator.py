@@ -2,8 +2,7 @@
 
 """The interface between the command policy and a board's encoding of motion.
 
-An actuator turns the policy's decision into packets, and may repeat them (`set_point_stream.py`).
-An actuator reads no clock and refuses no order.
+An actuator turns orders into packets, and may repeat them. It refuses no order of the policy.
 """
 
 from typing import Protocol

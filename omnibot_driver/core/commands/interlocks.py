@@ -2,8 +2,7 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method ``why_not_…`` returns the reason for a refusal, as a sentence with a remedy; empty if
-there is none.
+Each method ``why_not_…`` returns the reason for a refusal, with a remedy; empty if there is none.
 """
 
 from typing import Final
@@ -46,10 +45,9 @@ class Interlocks:
         return "the driver is shutting down; start it again" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, by this class or elsewhere.
+        """Record that a motion command was refused; call this for every refused command.
 
-        Call this method for every refused command. After the motion monitor's first stop, motion is
-        allowed again only when commands have ceased for some time, which begins again here.
+        The call restarts the waiting time after a first stop by the motion monitor.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 

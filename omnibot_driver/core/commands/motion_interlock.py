@@ -57,8 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        After the monitor's second stop within 60 s, the release allows motion again if the board
-        has no ~/start. In all other cases, the release changes nothing.
+        If the board has no ~/start, the release ends the refusal after the monitor's second stop.
+        Otherwise, it changes nothing.
         """
         if self.until is Until.ESTOP:
             self.start()
@@ -69,13 +69,10 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Restart the waiting time after a first stop by the monitor.
+        """Restart the waiting time ``timeout_s`` after a first stop by the monitor.
 
-        Motion is refused until no command has arrived for ``timeout_s``. Call this method in two
-        cases:
-
-        * A command was refused: its sender is still active.
-        * This process has stalled for ``stalled_s``: commands may have arrived unnoticed.
+        Call this method after a refused command, because its sender is still active. Call it also
+        after a stall of ``stalled_s``, because commands may have arrived unnoticed.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now
@@ -83,8 +80,8 @@ class MotionInterlock:
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        * ``timeout_s``: time in s without commands that ends the refusal after a first stop.
-        * ``stands``: whether the command is a standstill, which is always allowed.
+        ``timeout_s``: waiting time in s without commands after a first stop. ``stands``: whether
+        the command is a standstill, which is always allowed.
         """
         reason = "" if stands else self.reason(now, timeout_s)
         if not stands:

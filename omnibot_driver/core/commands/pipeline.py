@@ -44,7 +44,7 @@ class CommandPipeline:
     * ``policy``: the command in effect, its expiry and the e-stop latch.
     * ``interlock``: refuses motion after the motion monitor has stopped the robot.
     * ``monitored``: whether the motion monitor is enabled.
-    * ``obeys``: False if the session replays a recording.
+    * ``obeys``: False for a recording.
     """
 
     def __init__(
@@ -102,8 +102,8 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        The robot is stopped if the command cannot be encoded any more, or if a standstill has
-        become a motion, which was never checked.
+        The robot is stopped if the encoding fails, or if a standstill has become an unchecked
+        motion.
         """
         current = self.policy.current
         if current is None:
@@ -148,8 +148,8 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity.
 
-        ``age_s``: age of the sender's stamp in s; the command expires earlier by this age. Raises
-        CommandRefused if the velocity is not allowed, or if the stamp is too old or in the future.
+        ``age_s``: age of the sender's stamp in s; it shortens the time to expiry. Raises
+        CommandRefused.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -187,8 +187,8 @@ class CommandPipeline:
     def count_refused(self, count: int, now: float) -> list[str]:
         """React to rejected displacements; return notices for the user.
 
-        Several in a row show that the robot does not move as commanded. ``count``: number of
-        displacements that were rejected since the driver began.
+        Several in a row are a fault. ``count``: number of rejected displacements since the driver
+        began.
         """
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
@@ -255,8 +255,7 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only the loss of a goal gives a notice: velocity commands are repeated, and the next one is
-        refused with a notice.
+        Only the loss of a goal gives a notice: the next velocity command is refused with a notice.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
@@ -268,10 +267,10 @@ class CommandPipeline:
         ]
 
     def end_goal(self, now: float) -> list[str]:
-        """Drop the goal or the docking, because of a zero ``cmd_vel``; return notices for the user.
+        """Drop the goal or the docking after a refused zero ``cmd_vel``; return notices for the
+        user.
 
-        The zero ``cmd_vel`` was refused, but still ends the motion. A goal stays if the board's
-        control switch does not permit velocities.
+        The goal stays if the board's control switch does not permit velocities.
         """
         goal = isinstance(self.policy.current, GoalSetpoint)
         motion = "goal" if goal else self._board.own_motion
@@ -287,7 +286,7 @@ class CommandPipeline:
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 
-        A goal becomes invalid when the origin or a scale of the odometry frame changes.
+        A change of the odometry frame makes a goal invalid.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):

@@ -2,8 +2,7 @@
 
 """The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-A board continues the last motion until it receives Stop, so an expired command needs a Stop. This
-module reads no clock.
+A board continues the last motion until it receives Stop.
 """
 
 import math
@@ -93,8 +92,8 @@ class CommandPolicy:
     def halt(self, now: float) -> None:
         """Drop the current command, and repeat Stop until a standstill is proved.
 
-        * The repetition lasts at least ``STOPPING_S``, and without proof at most ``UNPROVED_S``.
-        * While the e-stop is latched, the emergency stop is repeated instead, until ``release``.
+        Stop is repeated for ``STOPPING_S`` to ``UNPROVED_S``. While the e-stop is latched, the
+        emergency stop is repeated instead, until ``release``.
         """
         self.current = None
         self.quiet = False

@@ -2,8 +2,8 @@
 
 """An actuator that decides which set-point frame is sent when.
 
-Boards that follow set-points do not acknowledge frames, so frames are repeated. This module does
-not know the content of a frame, and reads no clock.
+Boards that follow set-points do not acknowledge frames, so frames are repeated. This module reads
+no clock.
 """
 
 import math
@@ -22,8 +22,8 @@ PACE_S: Final = 0.01
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s; short enough for commands at 50 Hz.
 
-On a line that loses bytes, more frequent set-points would be obeyed wrongly for a larger part of
-the time (docs/internals/integrity.md).
+On a line that loses bytes, more set-points would mean more wrong motion
+(docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest rate at which Stop and the emergency stop are repeated, in Hz."""
@@ -101,13 +101,10 @@ class SetpointStream:
             self._fresh_at = self._stop_at
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that the packets of a request were written, and adapt what to send next.
+        """Record that the packets of a request were written.
 
-        The set-point in effect is then sent again at once:
-
-        * After Stop, unless the set-point is zero: Stop has ended the motion.
-        * After other packets, because the board may complete a damaged motion frame with their
-          first bytes, and obey a wrong motion.
+        A motion in effect is then sent again at once: Stop has ended the motion, or the packets may
+        have completed a damaged motion frame.
         """
         if self._heard is not None:
             self._heard(packets, now)

@@ -21,8 +21,8 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: limits in m and rad. If the distance or the angle to the goal
-grows by more, the robot drives away from the goal. The overshoot of a controller is always smaller.
+"""``LEAVING_M``, ``LEAVING_RAD``: a robot drives away from its goal if the distance or the angle to
+it grows by more, in m or rad. The overshoot of a controller is smaller.
 """
 
 
@@ -67,10 +67,9 @@ class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
     * The attribute ``is_zero``: whether the command is a standstill.
-    * The argument ``is_zero``: returns whether an order is a standstill. Raises CommandRefused if
-      the order cannot be encoded.
-    * ``before``: previous set-point. The ramp starts at its present velocity, or at rest if it is
-      not a body velocity.
+    * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
+    * ``before``: previous set-point. The ramp starts at its velocity; at rest if it is no body
+      velocity.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 
@@ -120,8 +119,7 @@ class SteadySetpoint:
     """A command whose order does not change.
 
     * The attribute ``is_zero``: whether the command is a standstill.
-    * The argument ``is_zero``: returns whether an order is a standstill. Raises CommandRefused if
-      the order cannot be encoded.
+    * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
     """
 
     settled: Final = True
@@ -144,10 +142,9 @@ class SteadySetpoint:
 class GoalSetpoint:
     """A pose to drive to.
 
-    * ``goal``: the pose in the odometry frame.
-    * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: ``Odometry.alignments`` at the time of the command. If it has changed,
-      ``place`` is wrong, and the goal is discarded.
+    * ``goal``, ``place``: the pose in the odometry frame, and in the board's earth frame.
+    * ``alignment``: ``Odometry.alignments`` at the time of the command; after a change, the goal is
+      discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """

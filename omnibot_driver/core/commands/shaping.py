@@ -2,7 +2,7 @@
 
 """Command shaping: checks and limits a command, and turns it into a set-point for the board.
 
-The set-point is in the board's axes and frame. This module does not know when anything is sent.
+The set-point is in the board's axes and frame.
 """
 
 from collections.abc import Sequence

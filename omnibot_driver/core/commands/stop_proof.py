@@ -26,8 +26,7 @@ SLACK_S: Final = 1e-6
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof.
 
-A single displacement is not enough. It could be damaged, or it could come from the time before the
-wheels began to turn.
+A single displacement could be damaged, or come from the time before the wheels began to turn.
 """
 PROOFS: Final = 2.0
 """Shortest time for which the driver waits for a proof, as a multiple of ``still_s``.
@@ -47,10 +46,10 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether the robot stood still for ``still_s`` after Stop, or the board paused. A
-      motion command, a measured motion or ``begin`` ends the proof.
+    * ``proved``: whether the robot stood still for ``still_s`` after Stop, or the board paused, and
+      no motion was commanded or measured since then.
     * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
-    * ``measured``: whether a measured displacement arrived later than ``UNDER_WAY_S`` after Stop.
+    * ``measured``: whether a displacement arrived later than ``UNDER_WAY_S`` after Stop.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

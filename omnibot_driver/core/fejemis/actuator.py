@@ -2,8 +2,8 @@
 
 """Sends the motion lines (``rc``) to both boards, and repeats them.
 
-The lines are also repeated after each new angle of the front wheel if they depend on this angle, or
-if they have no checksum.
+If the front wheel's angle limits the speed, or without checksums, they are also repeated after each
+new angle.
 """
 
 import math
@@ -54,7 +54,7 @@ class PairStream(SetpointStream):
     def angle_told(self, angle_rad: float, now: float) -> bool:
         """Receive the front wheel's angle in rad; return whether it shows a new fault of the wheel.
 
-        The wheel has a fault if it does not follow its commanded angle.
+        A faulty wheel does not follow its commanded angle.
         """
         if self.driving and self._pair.restless:
             self._said_at = -math.inf

@@ -2,7 +2,7 @@
 
 """Writes the front wheel's angle as a line in which the drive board can detect damage.
 
-At a misread angle above 90°, the board would drive its inner wheel faster than the outer one.
+With a misread angle above 90°, the board would drive the wrong wheel faster.
 """
 
 import math
@@ -23,8 +23,8 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit in degrees for a misread angle.
 
-A checksum may not detect that an angle has lost its minus sign; the board then reads an angle to
-the right as an angle to the left. The driver keeps such an angle below this limit.
+If an angle loses its minus sign unnoticed, the board turns to the wrong side. The driver keeps such
+an angle below this limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -52,7 +52,7 @@ class AngleRelay:
 def heard_instead(text: str) -> Iterator[float]:
     """Yield each number that a board may read if two characters of ``text`` are lost unnoticed.
 
-    The checksum misses some pairs of characters. The number is 0 if the other characters form none.
+    The number is 0 if the other characters form none.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:

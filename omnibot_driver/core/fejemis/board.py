@@ -173,8 +173,7 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The watchdog process may already have switched them off. The stall is not regarded as
-        silence of the boards.
+        The stall is not regarded as silence of the boards.
         """
         self._inbound.watch.stalled()
         for half in self._ports.halves:
@@ -308,8 +307,8 @@ class FejemisBoard(Board):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the packets that the guard sends if the driver fails: without and with e-stop.
 
-        The first item contains Stop; the second contains the emergency stop, then Stop. Both switch
-        brush and lift off.
+        Both items contain Stop and switch brush and lift off. The second begins with the emergency
+        stop.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

@@ -2,7 +2,7 @@
 
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
-A value is used only after two equal reports in a row: 1 in 99 damaged lines has a correct checksum.
+Only two equal reports confirm a value: 1 in 99 damaged lines has a correct checksum.
 """
 
 import math
@@ -39,8 +39,8 @@ DIGIT: Final = 6e-4
 The larger one applies, because the board prints few digits.
 """
 HALF: Final = 0.51
-"""Upper limit of this tolerance, in units of the last digit that the board prints: half a unit for
-rounding, and a little for single precision. No limit if the last digit is unknown.
+"""Upper limit of this tolerance, in units of the last printed digit: half a unit for rounding, and
+a little for single precision. No limit if the last digit is unknown.
 """
 
 
@@ -60,7 +60,8 @@ class Configuration:
         """
         self._digits: dict[str, tuple[float, ...]] = {}
         """For each number in the newest line of a kind: the unit of its last printed digit, such as
-        0.001 for ``0.420``. The keys are the keywords of the lines."""
+        0.001 for ``0.420``. By keyword.
+        """
         self.turned = False
         """Whether the board's ``confs`` line (steering geometry) has the track as its first number.
         The board's help text says that the track is the last number."""
@@ -155,8 +156,7 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None if they are unknown.
 
-        The user's values are returned while the board has reported none, or if the board has only
-        rounded them.
+        The user's values apply until the board reports values that differ by more than rounding.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

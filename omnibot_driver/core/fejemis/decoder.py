@@ -39,8 +39,8 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: whether the last line other than a heartbeat contradicts ``sums``; only with the
-      setting auto. Lines to the board then carry no checksum.
+    * ``doubtful``: with the setting auto: whether the last line, except heartbeats, contradicts
+      ``sums``.
     * ``contradicted``: whether the last line contradicts the user's setting ``line_sums``.
     """
 

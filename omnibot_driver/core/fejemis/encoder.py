@@ -81,8 +81,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        * If the angle limits the speed: each new angle changes the limit.
-        * If the lines have no checksums: new lines after 15 ms replace a damaged one.
+        * With a limited speed: each new angle changes the limit.
+        * Without checksums: a damaged line is soon replaced.
         """
         return self.held or not self._pair.with_sums
 
@@ -108,8 +108,7 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist of the robot's body that the sent ``packets`` command.
 
-        The result is a standstill, unless ``packets`` are those of the last motion from ``encode``,
-        passed for the first time.
+        Only the first call with the packets of the last ``encode`` returns a motion.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

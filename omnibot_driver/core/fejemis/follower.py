@@ -2,8 +2,8 @@
 
 """Checks that the front wheel follows its commanded angle, and otherwise refuses motion.
 
-* After a first fault: until the wheel moves, or the user calls ~/start.
-* After a second fault within 60 s: until the user calls ~/start.
+The refusal ends when the wheel moves, or with ~/start; after a second fault within 60 s, only with
+~/start.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A line in another form is regarded as damaged. The third such line in a row with the same form is
-accepted, and changes the learnt form.
+A line in another form is rejected, but three equal forms in a row are learnt.
 """
 
 from typing import Final
@@ -11,8 +10,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum. If as
-many of 24 lines of one kind lack the learnt form, the form of this kind is no longer checked.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: if as many of 24 lines of one kind lack the learnt form, the
+form is no longer checked. For lines with and without a correct checksum.
 """
 OF: Final = 24
 

@@ -2,7 +2,7 @@
 
 """Checks each reported angle of the front wheel, and whether the angle sensor works.
 
-The module knows angles, times and the sensor's status bits; it does not know the commanded angle.
+The module does not know the commanded angle.
 """
 
 import math
@@ -35,8 +35,9 @@ BITS: Final = (
     (1, True, "magneto core loops not finished"),
     (0, False, "supply in 5 V mode"),
 )
-"""The diagnosis bits of the angle sensor (manual, fwl). Each entry has three parts: the number
-of the bit, its value without a fault, and the name of the fault."""
+"""The diagnosis bits of the angle sensor (manual, fwl): number of the bit, its value without a
+fault, name of the fault.
+"""
 
 
 class FrontWheel:
@@ -79,8 +80,7 @@ class FrontWheel:
     def drives_by_rad(self) -> float:
         """Angle in rad that is relayed to the drive board, limited to ±90°.
 
-        At a larger angle, the board would drive its inner wheel faster than the outer one (manual's
-        equations).
+        At a larger angle, the board would drive its inner wheel faster than the outer one.
         """
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 
@@ -106,8 +106,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always accepted. A later one must be near the last accepted angle, or
-        near a rejected angle directly before.
+        Except for the first, it must be near the last accepted angle, or near a rejected angle
+        directly before.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -3,8 +3,6 @@
 """One of the two boards (a *half*): its identity, its data streams, and its silence.
 
 If a stream does not arrive, the driver subscribes again.
-
-The module knows lines and times; it does not know what a message is used for.
 """
 
 import math
@@ -65,8 +63,7 @@ class Half:
     * ``identity``: the identity in its heartbeats; None before the first heartbeat.
     * ``restarted``: whether the board has restarted. The caller resets this flag.
     * ``heard_at``: time in s of the last valid line.
-    * ``clocks``: clocks of both boards from earlier connections, by identity. Both halves share
-      them, because the boards may exchange their ports.
+    * ``clocks``: clocks from earlier connections, by identity; shared by both halves.
     """
 
     def __init__(self, line_sums: LineSums, clocks: dict[int, TeensyClock]) -> None:
@@ -103,9 +100,8 @@ class Half:
         self._left = False
         self._at: dict[str, float] = {}
         self._needed, self._needed_since, self._was_slow = 0, math.inf, False
-        """``_needed``: number of lines of the stream that driving requires, since
-        ``_needed_since``, in s; infinity before the first check. ``_was_slow``: whether the last
-        check found too few lines.
+        """``_needed``: lines of the required stream since ``_needed_since`` (s; infinity before the
+        first check). ``_was_slow``: whether the last check found too few lines.
         """
         self._next_at = -math.inf
         self._unsure_at: float | None = None
@@ -210,8 +206,7 @@ class Half:
     def _is_slow(self, now: float) -> bool:
         """Return whether the stream that driving requires is much slower than its subscription.
 
-        Another program may have changed the period. Two calls in a row must find too few lines:
-        after the first, lines may still wait to be read.
+        Two calls in a row must find too few lines, because lines may wait to be read.
         """
         assert self.role is not None
         count, since = self._needed, self._needed_since

@@ -2,8 +2,7 @@
 
 """Computes the sampling time of each IMU sample, and converts the sample to SI units.
 
-The board takes a sample every 10 ms, but sends no sampling times. A sampling time is a constant
-*phase* plus whole periods; the arrival times determine the phase.
+Each sampling time is a constant *phase*, found from arrival times, plus periods of 10 ms.
 """
 
 import math
@@ -17,12 +16,9 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Limit for the time between the arrivals of two successive samples, in sampling periods.
+"""Limit for the time between the arrivals of two samples that both seem late, in sampling periods.
 
-If both samples seem late by about a period or more:
-
-* Above the limit, an earlier sample was lost.
-* Below the limit, the host has stalled, and no sample was lost.
+Above it, an earlier sample was lost. Below it, the host has stalled.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
@@ -42,8 +38,7 @@ class ImuSamples:
     """Converter of IMU samples to readings, and of their arrival times to sampling times.
 
     * ``unit``: unit in which the board sends accelerations.
-    * ``rates``: gyro rates of the last sample, in rad/s; NaN before the first.
-    * ``forces``: accelerations of the last sample, in m/s²; NaN before the first.
+    * ``rates``, ``forces``: last sample, in rad/s and m/s²; NaN before the first.
     """
 
     def __init__(self, unit: AccelerationUnit) -> None:
@@ -80,10 +75,10 @@ class ImuSamples:
     ) -> float:
         """Return the time at which the board took the next sample. All times are in s of its clock.
 
-        * ``arrived_s``: arrival time of this sample.
-        * ``not_before_s``: time of the last pose before the sample.
-        * ``next_pose_s``: time of the first pose after the sample; infinity if none has arrived.
-        * ``skipped``: number of incomplete samples since the previous sample.
+        * ``arrived_s``: arrival time of the sample.
+        * ``not_before_s``, ``next_pose_s``: times of the poses before and after the sample;
+          infinity if the next pose has not arrived.
+        * ``skipped``: number of incomplete samples before it.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -117,11 +112,10 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Update the phase of the sampling times after a new sample.
+        """Update the phase: the latest with which no recent sample arrives before its sampling
+        time.
 
-        ``delay_s``: time in s from sampling, by the old phase, to arrival. The new phase is the
-        latest one with which no recent sample arrives before its sampling time. Recent samples are
-        those of the last three complete blocks, and later ones.
+        ``delay_s``: time in s from the new sample's sampling, by the old phase, to its arrival.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

@@ -2,8 +2,7 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-A pair is a gyro line and an acceleration line. If the second line of one sample and the first line
-of the next are lost, the lines that remain form a false pair.
+After a loss of lines, a pair may be false: its two lines come from two samples.
 """
 
 import itertools
@@ -30,8 +29,7 @@ for the next pose.
 SILENT_S: Final = 0.1
 """Longest usual time, in s, without gyro and acceleration lines.
 
-After a longer time, new pairs wait for the next pose. The pose shows whether the host read late, or
-the board sent nothing; in the second case, the pairs are rejected.
+After a longer time, new pairs wait for the next pose, and are rejected if the board sent nothing.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver in which new pairs must wait for the next pose: the
@@ -48,7 +46,7 @@ arrives in it. Such an interval is probably between two samples.
 """
 PATIENCE: Final = 60
 """Number of intervals after which the first line of a sample is decided, even if the magnitude of
-``_evidence_s`` is below ``KNOWN_S``. It stays small if all intervals are equally long.
+``_evidence_s`` is still below ``KNOWN_S``.
 """
 MOST: Final = 10
 """Largest magnitude of a counter in ``_outside``."""
@@ -63,10 +61,10 @@ class Pair:
     """A gyro and an acceleration line, probably of one sample.
 
     * ``at``: time in s at which the second line arrived.
-    * ``pose_s``: the board's time of the last pose before the pair.
+    * ``pose_s``, ``next_pose_s``: the board's times of the poses before and after the pair;
+      infinity if the next pose has not arrived.
     * ``skipped``: number of incomplete samples since the previous pair.
     * ``doubtful``: whether the pair must wait for the next pose.
-    * ``next_pose_s``: the board's time of the next pose; infinity if it has not arrived.
     """
 
     gyro: Gyro
@@ -83,9 +81,9 @@ Oriented = tuple[Attitude, float]
 
 
 class ImuPairs:
-    """Forms pairs. A pair is a gyro line and an acceleration line of the same sample of the IMU.
+    """Forms pairs: a gyro and an acceleration line of the same IMU sample.
 
-    Orientations pass through. ``take`` returns pairs and orientations in order of arrival.
+    ``take`` returns pairs and orientations in order of arrival.
     """
 
     def __init__(self) -> None:
@@ -98,8 +96,7 @@ class ImuPairs:
         unknown."""
         self._evidence_s = 0.0
         """Sum of the intervals before gyro lines, minus the sum of those before acceleration lines,
-        in s. The interval before the first line of a sample is longer, so a positive value shows
-        that the gyro line comes first.
+        in s. Positive if the gyro line of a sample comes first: the interval before it is longer.
         """
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
@@ -135,8 +132,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line of another ``kind``, its keyword.
 
-        If a pair waits for its second line, this line is regarded as lost, unless lines of this
-        ``kind`` usually come within a pair.
+        The missing second line of a pair is then regarded as lost, unless lines of this ``kind``
+        usually come within a pair.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -151,11 +148,8 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all waiting pairs.
 
-        They are rejected in two cases:
-
-        * Fewer gyro lines and fewer acceleration lines have arrived than the board sends between
-          two poses.
-        * The time since the previous pose is unknown.
+        Pairs are rejected if gyro and acceleration lines are missing since the previous pose, or if
+        the time since then is unknown.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
@@ -172,8 +166,7 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the pairs and orientations in order of arrival, up to the first pair that must
-        wait.
+        """Return the pairs and orientations in order of arrival, up to the first doubtful pair.
 
         Call this method after a pose and at the end of a read.
         """

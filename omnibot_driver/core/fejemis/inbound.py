@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handles all messages: passes each message to the parts that use it, and keeps the robot's mode.
-
-The module knows messages and times; it does not know how lines are written.
-"""
+"""Handles all messages: passes each to the parts that use it, and keeps the robot's mode."""
 
 from collections.abc import Callable
 
@@ -21,7 +18,7 @@ from omnibot_driver.core.readings import PausedReading
 AngleTold = Callable[[float, float], bool]
 """Function that receives the front wheel's angle in rad and the time in s.
 
-It returns True for a new fault: the wheel does not turn to its commanded angle.
+It returns True for a new fault of the wheel.
 """
 
 
@@ -29,8 +26,7 @@ class Inbound:
     """Handler of all messages.
 
     * ``mode``: nominal while both boards send data and the drive board obeys.
-    * ``relay_rad``: angle of the front wheel that must still be sent to the drive board; None if
-      there is none.
+    * ``relay_rad``: the front wheel's angle that must still be sent to the drive board, or None.
     """
 
     def __init__(

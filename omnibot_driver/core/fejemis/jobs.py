@@ -2,8 +2,8 @@
 
 """Runs the user's jobs one at a time, and checks whether they succeed.
 
-A job is a calibration, a power-off, or saving or loading of the configuration. The boards
-acknowledge none of them.
+Jobs are calibrations, power-off, and saving or loading of the configuration. The boards acknowledge
+none of them.
 """
 
 import math
@@ -42,9 +42,9 @@ SAID: Final = 3
 For a calibration, CALIBRATIONS is the limit.
 """
 UNCHANGED_S: Final = 2.4
-"""Time limit in s for a change of the offsets, counted from a command to calibrate.
+"""Time limit in s for a change of the offsets after a command to calibrate.
 
-If the offsets are still unchanged after this time, the command was probably lost.
+If the offsets are then still unchanged, the command was probably lost.
 """
 CALIBRATIONS: Final = 2
 """Largest number of times that one job sends the command to calibrate.

@@ -3,7 +3,7 @@
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
 Lines are repeated, because the board does not acknowledge them. A line that moves the lift is sent
-once; it limits the run time, so the lift stops even if the next line is lost.
+once, because it limits the run time.
 """
 
 import math
@@ -22,7 +22,7 @@ BRUSH_AGAIN_S: Final = 1.0
 PACE_S: Final = 0.05
 """Shortest time in s between two lines for the lift, or between two lines for the lights.
 
-Of several commands in this time, only the newest is sent. A stop of the lift is sent at once.
+Of several commands in this time, only the newest is sent. A stop of the lift is not delayed.
 """
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
@@ -159,8 +159,7 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The voltage may be lower than ``volts``, so that the checksum detects damage to the line, but it
-    is at least ``LEAST_PART * volts``.
+    The voltage may be lowered to ``LEAST_PART * volts``, so that the checksum detects damage.
     """
     if not volts:
         return OFF[0], 0.0

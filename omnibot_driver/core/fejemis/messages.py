@@ -2,8 +2,7 @@
 
 """The messages that the two boards send: one class for each kind of line.
 
-Units are the boards': m, m/s, m/s², s, µT, V, A. Each class says whether its angles are in degrees
-or rad.
+Units are the boards': m, m/s, m/s², s, µT, V, A. Angles are in degrees or rad, as stated.
 """
 
 from dataclasses import dataclass
@@ -151,12 +150,10 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: track and distance from the axle to the steered wheel, in m, in the order of the
-    line.
+    """``confs``: track and distance from the axle to the steered wheel, in m, as in the line.
 
-    The boards' help text says that the track is second, but some boards report it first.
-
-    ``digits``: for each number, the unit of its last digit in the line; empty if unknown.
+    The track is second by the boards' help text, but first on some boards. ``digits``: for each
+    number, the unit of its last digit in the line; empty if unknown.
     """
 
     first_m: float

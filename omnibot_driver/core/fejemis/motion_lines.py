@@ -2,9 +2,8 @@
 
 """Writes ``rc`` lines in which the checksum detects the loss of any two characters.
 
-Several pairs of speed and turn rate command the same motion: the front board uses only their ratio,
-the drive board only the root of the sum of their squares. The safe line nearest to the command is
-selected.
+Several lines command the same motion: the front board uses only the ratio of speed and turn rate,
+the drive board only the root of the sum of their squares.
 """
 
 import math
@@ -29,10 +28,10 @@ ANGLE_COST: Final = 1e4
 factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""The smallest linear speed in the drive board's line, apart from 0, is the outer wheel's speed
-divided by ``SLOWEST``.
+"""Ratio of the outer wheel's speed to the smallest linear speed in the drive board's line, apart
+from 0.
 
-Only a forward line can contain the linear speed 0: the sign gives the direction.
+A backward line cannot contain 0, because the sign gives the direction.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
@@ -99,10 +98,9 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the line with the lowest cost among those whose checksum would reveal damage.
+    """Return the cheapest line whose checksum would reveal damage, or else the cheapest line.
 
-    Without such a line, return the line with the lowest cost. ``signs``: those of speed and turn
-    rate.
+    ``signs``: the signs of speed and turn rate, as text.
     """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)

@@ -2,9 +2,9 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-The checksum misses two lost characters whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``,
-``.`` and ``5``, ``-`` and ``6``. A line must not contain both. Motion lines begin with ``rc 2``, so
-their numbers contain no ``1``.
+Safe lines do not contain both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or ``-`` and
+``6``, whose codes add up to 99. Motion lines begin with ``rc 2``, so their numbers contain no
+``1``.
 """
 
 from bisect import bisect_left, bisect_right
@@ -21,8 +21,7 @@ LARGEST: Final = 4
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all safe numbers in rising order, and the text of each number.
 
-    In a safe number, the checksum detects the loss of any two characters. ``negative``: whether the
-    line contains a minus sign; its numbers then contain no ``6``.
+    ``negative``: whether the line contains a minus sign; its numbers then contain no ``6``.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.

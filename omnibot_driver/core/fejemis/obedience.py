@@ -2,8 +2,7 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-The driver sends ``stop`` for a pause and for its own e-stop. It sends ``start`` by itself only when
-the e-stop is released; after a pause, the user must request it.
+After an e-stop, the driver sends ``start`` by itself; after a pause, only at the user's request.
 """
 
 import math
@@ -20,11 +19,10 @@ START_AGAIN_S: Final = 0.2
 
 
 class Obedience:
-    """State that shows whether the drive board obeys motion commands, and why not.
+    """Whether the drive board obeys motion commands, and why not.
 
     * ``estopped``: whether the driver's e-stop is latched.
-    * ``source``: the last rcSource, the source of the obeyed commands; None before the first
-      heartbeat.
+    * ``source``: the last rcSource, the source of the obeyed commands, or None.
     * ``pause_said``: whether the user has requested a pause since the last start.
     """
 

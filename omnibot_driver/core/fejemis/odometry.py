@@ -2,9 +2,8 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-Poses have coarse steps of 1 mm, and the sum of wheel speeds drifts. So a displacement comes from
-the wheel speeds, and is corrected towards the newest pose. Without recent wheel speeds, or if they
-clearly contradict the pose, the pose alone decides.
+Poses have coarse steps of 1 mm; sums of wheel speeds drift. So the wheel speeds are corrected
+towards the newest pose. If they contradict the pose, or are missing, the pose decides.
 """
 
 import math
@@ -111,9 +110,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
         """Return the displacement from the previous pose in a list; empty if there is none.
 
-        Every 0.2 s, after a restart of the board, and in a new coordinate frame, the list also
-        contains a PoseReading: the first pose of the frame, plus all displacements that were
-        returned since then, even if a later check rejects them.
+        Every 0.2 s and in a new coordinate frame, the list also contains a PoseReading: the first
+        pose of the frame, plus all displacements returned since then.
         """
         displacement = self.pose(pose)
         if displacement is None:
@@ -126,10 +124,10 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad, restarted=moved)]
 
     def pose(self, pose: BoardPose) -> DisplacementReading | None:
-        """Return the displacement from the previous pose; None if ``pose`` is rejected.
+        """Return the displacement from the previous pose; None if ``pose`` is rejected or the
+        first.
 
-        * For the driver's first pose: None.
-        * For the first pose after a restart of the board: a displacement of 0.
+        After a restart of the board, the first displacement is 0.
         """
         before, self._time_s = self._pose, pose.time_s
         if self._speeds_new:

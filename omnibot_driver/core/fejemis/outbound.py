@@ -2,7 +2,7 @@
 
 """Adds checksums to lines for the boards, and checks whether damage to a line is detected.
 
-The checksum does not detect two lost characters whose codes add up to 99 or 198.
+The checksum misses two lost characters whose codes add up to 99 or 198.
 """
 
 from functools import lru_cache
@@ -32,8 +32,7 @@ def lines(*texts: bytes, sums: bool) -> bytes:
 def robust(text: bytes) -> bool:
     """Return whether the checksum of ``text`` detects each critical loss of two characters.
 
-    Critical: one character is a line end or a digit of the checksum, the other is ``;`` or part of
-    a number.
+    Critical: a line end or a digit of the checksum, together with ``;`` or a part of a number.
     """
     # A lost line end joins two lines. Let S be the sum of the second line with its prefix ``;NN``.
     # The board accepts the joined line if a character with the code S is lost too. So S must not be

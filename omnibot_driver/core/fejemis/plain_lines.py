@@ -2,8 +2,7 @@
 
 """Writes motion lines (``rc``) without a checksum, in a form that limits the effect of damage.
 
-If a decimal point, a later digit or a minus sign is lost, the board obeys a wrong number until the
-next line.
+Some losses, such as that of a decimal point, still give a wrong number until the next line.
 """
 
 import math

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds out which board is at which port, and addresses lines to the boards.
+"""Finds out which board (or *half*) is at which port, and addresses lines to the boards.
 
-Each of the two Teensys, drive and front, is also called a *half*. An unidentified board only gets
-requests for its heartbeat, and lines that stop or switch off something.
+An unidentified board only gets heartbeat requests, and lines that stop or switch off something.
 """
 
 from dataclasses import replace
@@ -77,8 +76,7 @@ class Ports:
     def identify(self) -> bool:
         """Find out which board is at which port. Call this after a heartbeat.
 
-        Return whether the known order of the boards has changed. At first, the driver assumes the
-        expected order.
+        Return whether the known order of the boards has changed.
         """
         first, second = (half.role for half in self.halves)
         if first == second:
@@ -116,8 +114,7 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        While its port is unknown, the lines go to each port without a known role; if there is no
-        such port, to both.
+        If its port is unknown, the lines go to each port without a known role, or else to both.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

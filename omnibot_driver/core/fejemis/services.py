@@ -2,7 +2,7 @@
 
 """The user's requests, except motion: brush, lift, LED strip, and jobs such as a calibration.
 
-The module knows when each request is allowed. It does not know how a request is sent or confirmed.
+The module decides when each request is allowed.
 """
 
 from typing import Final, Protocol

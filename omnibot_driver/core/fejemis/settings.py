@@ -14,8 +14,7 @@ AccelerationUnit = Literal["m/s^2", "g"]
 class Written(Enum):
     """Settings that the driver can write to a board.
 
-    The value of each member is a pair: the command that writes the setting, and how many numbers
-    follow this command.
+    Each value is the command that writes the setting, and the count of its numbers.
     """
 
     WHEELS = "confw", 5
@@ -45,11 +44,11 @@ class Written(Enum):
 class FejemisSettings:
     """The user's settings of the robot.
 
-    * ``track_m``, ``wheelbase_m``: used until the boards report their own sizes, in m.
+    * ``track_m``, ``wheelbase_m``: used until the boards report their own sizes.
     * ``line_sums``: whether text lines carry a checksum; with ``auto``, the heartbeats show this.
     * ``allow_reverse``: whether to send negative speeds (docs/boards/fejemis.md).
     * ``command_timeout_s``: longest time that the lift runs after one command.
-    * ``low_cell_v``: voltage per cell below which the battery is reported as low.
+    * ``low_cell_v``: voltage per cell below which the battery is low.
     * ``written``: values that the driver writes to the boards.
     """
 

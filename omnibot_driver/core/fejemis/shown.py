@@ -23,8 +23,8 @@ def figures(
 ) -> BoardFigures:
     """Return counters and other values for diagnostics. Counters continue over all connections.
 
-    * ``source``: rcSource, the source of the motion commands that the drive board obeys.
-    * ``trouble``: why the robot must not be driven; empty if driving is allowed.
+    * ``source``: rcSource, the source of the commands that the drive board obeys.
+    * ``trouble``: why the robot must not be driven, or empty.
     """
     return BoardFigures(
         rates_hz={"IMU": 100.0, "Odometry": 50.0},

@@ -2,8 +2,7 @@
 
 """Converts a body twist into commands for both boards.
 
-Until the front wheel reaches its angle, the drive board gets a lower speed, or a stop before a turn
-on the spot.
+Until the front wheel reaches its angle, the drive board gets a lower speed or a stop.
 """
 
 import math
@@ -18,14 +17,12 @@ ACROSS_RAD: Final = math.radians(85.0)
 """Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""``ALIGNED_RAD``: largest deviation of the front wheel from its target angle, in rad, at which a
-turn on the spot may begin, or other motion may have full speed.
-
-``STILL_ALIGNED_RAD``: largest deviation, in rad, at which a turn on the spot may continue.
+"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: largest deviation of the front wheel from its target
+angle, in rad, at which a turn on the spot may begin, and may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel in rad that gives the permitted error of the body's velocity at full
-speed. At a larger deviation, the speed is lowered until the error is permitted.
+"""Deviation of the front wheel, in rad, whose error of the body's velocity is permitted at full
+speed. At larger deviations, the speed is lowered.
 """
 
 
@@ -34,7 +31,7 @@ class Steered:
     """A command for both boards, and the resulting motion of the body.
 
     * ``speed_mps``, ``turn_radps``: speed and turn rate for the front board.
-    * ``part``: factor, 0..1, of the speed and turn rate for the drive board.
+    * ``part``: factor, 0..1, for the drive board's speed and turn rate.
     * ``angle_rad``: the angle that the front wheel must reach.
     * ``twist``: the body's motion at the front wheel's current angle.
     * ``whole``: whether ``part`` is 1.
@@ -67,7 +64,7 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 def scale(twist: BodyTwist, track_m: float) -> float:
     """Return the factor for speed and turn rate in a motion line (``rc``); 1 for a stop.
 
-    With this factor, the drive board's outer wheel gets the speed that the twist requires.
+    The factor gives the drive board's outer wheel the speed that the twist requires.
     """
     # The drive board drives its outer wheel at sqrt(v² + w²), and turns about a centre that follows
     # from the measured front angle. The factor makes the root equal to the speed that the outer
@@ -126,8 +123,7 @@ def _allowed(
 ) -> float:
     """Return the largest allowed rim speed of the outer wheel, in m/s; infinity without a limit.
 
-    * ``angle_rad``, ``target_rad``: current and target angle of the front wheel.
-    * ``turning``: whether the body already turns on the spot.
+    ``angle_rad``, ``target_rad``: current and target angle of the front wheel.
     """
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:

@@ -1,8 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The checksum ``;NN`` in front of a line.
-
-A board does not detect the following damage:
+"""The checksum ``;NN`` in front of a line. It does not detect:
 
 * 1 in 99 random changes.
 * The loss of a ``c``, whose code is 99.

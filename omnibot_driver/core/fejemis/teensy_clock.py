@@ -2,8 +2,7 @@
 
 """Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-Lines arrive late, never early. So the conversion is a straight line just below all arrival times
-(docs/internals/time.md).
+The conversion is a straight line just below all arrival times (docs/internals/time.md).
 """
 
 import math
@@ -30,17 +29,12 @@ AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """Tolerance in s within which implausible board times must agree to begin the clock anew.
 
-* At least ``AGAIN`` such times in a row must agree: since the first, the board's time and the
-  arrival time advance by the same amount.
-* The last time must arrive at least ``AGAIN_AFTER_S`` s after the first.
-
-The tolerance also applies to lines that seem early.
+At least ``AGAIN`` of them in a row must advance like their arrival times, for ``AGAIN_AFTER_S``.
 """
 EARLIES_WITHIN_S: Final = 1.0
 """Longest time in s between lines that seem early and are counted together.
 
-Lines seem early if the clock began with a late line. Three (``AGAIN``) such lines begin the clock
-anew, even if late lines come between them.
+Three (``AGAIN``) such lines begin the clock anew, because it began with a late line.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -152,8 +146,7 @@ class TeensyClock:
     def _began_late(self, board_s: float, now: float) -> bool:
         """Begin the clock anew if enough lines seemed early and their times agree.
 
-        Return whether the clock has begun anew. A clock that began with a late line could otherwise
-        reject all punctual lines.
+        Return whether the clock has begun anew.
         """
         agree = all(
             before_s < board_s
@@ -176,8 +169,7 @@ class TeensyClock:
 class StampedReadings:
     """The readings that one call of the board returns, with their timestamps; a ``ReadingClock``.
 
-    Timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``. Only for this reason,
-    a timestamp may be later than the call.
+    Timestamps of one kind of reading differ by at least ``SMALLEST_STEP_S``.
     """
 
     skew_ppm = 0.0
@@ -196,7 +188,7 @@ class StampedReadings:
         """Add a reading with the timestamp ``stamp_s``, but at most ``now``.
 
         In any case, the timestamp is at least ``SMALLEST_STEP_S`` after the last one of the same
-        kind of reading.
+        kind.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

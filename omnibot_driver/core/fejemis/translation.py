@@ -147,10 +147,10 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add the waiting IMU samples and orientations to the readings, in order of arrival.
+        """Add the waiting IMU samples and orientations to the readings, up to the first doubtful
+        sample.
 
-        A sample that must wait for a pose stays in the queue, with all later items. Call this
-        method after a pose and at the end of a read.
+        Call this method after a pose and at the end of a read.
         """
         for item in self._pairs.take():
             if isinstance(item, Pair):

@@ -25,8 +25,7 @@ the other board sends.
 UNREAD_S: Final = 0.03
 """Longest usual time in s without a line of either board; each sends at least every 15 ms.
 
-After a longer time, no single board is blamed for missing data: the driver has read late, or both
-boards are disconnected.
+After a longer time, no single board is blamed: the driver may have read late.
 """
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
@@ -37,7 +36,7 @@ SLACK_S: Final = 1e-6
 
 
 class Watch:
-    """The timeouts of a Fejemis: for each board's data, for the front wheel's angle, for the pose.
+    """The timeouts of a Fejemis: for each board's data, the front wheel's angle, and the pose.
 
     * ``blind``: whether the front wheel's last angle is too old, or its sensor is faulty.
     * ``unposed``: whether the last pose is too old.
@@ -130,8 +129,7 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether the driver has read no line of either board for ``UNREAD_S``.
 
-        Data may then wait to be read. So neither board is blamed for missing data in the next
-        ``OLDEST_S``.
+        If so, neither board is blamed for missing data in the next ``OLDEST_S``.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

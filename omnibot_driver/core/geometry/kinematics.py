@@ -2,8 +2,7 @@
 
 """The interface that every arrangement of wheels offers to the driver.
 
-Axes are REP-103's: x forward, y left, yaw counter-clockwise. Wheel rates are in rad/s, in the order
-of ``joints``. The same methods convert small displacements of body and wheels.
+Axes are REP-103's; wheel rates are in rad/s. The methods also convert small displacements.
 """
 
 from collections.abc import Sequence

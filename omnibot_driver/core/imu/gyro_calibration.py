@@ -2,8 +2,7 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-Without displacements, a steady turn looks like rest, so a large bias is not accepted. Time is an
-argument.
+Without displacements, a steady turn looks like rest, so a large bias is rejected.
 """
 
 import math
@@ -101,7 +100,7 @@ class GyroCalibration:
     """Measures and refines the gyro's bias.
 
     * ``bias``: mean reading of the gyro at rest, in rad/s.
-    * ``refine``: whether to correct the bias after each second at rest, if displacements arrive.
+    * ``refine``: whether to correct the bias at rest, if displacements arrive.
     * ``answers``: one RequestDone for each finished measurement.
     """
 

@@ -41,15 +41,12 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 1.1
-"""Time in s after which a reset is repeated.
-
-In this time, stopped wheels come to rest, and two tick reports arrive. If unchanged small counts
-show that the board has not obeyed, the repetition restarts ``UNPROVED_S``: without a repetition,
-small counts would then count as success.
+"""Time in s after which a reset is repeated. Stopped wheels come to rest in this time, and two tick
+reports arrive.
 """
 STEADY_S: Final = 0.3
-"""Time in s without a change of the tick counts after which the wheels are regarded as at rest.
-With the period after a boot, 0.4 s, one unchanged report is enough.
+"""Time in s without a change of the tick counts after which the wheels are regarded as at rest;
+shorter than the report period after a boot, 0.4 s.
 """
 
 
@@ -299,8 +296,7 @@ class LoisEcuBoard(Board):
     def reset(self) -> Packets:
         """Return Stop and the reset command; return nothing while ``due`` repeats an earlier reset.
 
-        ``due`` repeats both lines until the ticks prove the reset, the driver gives it up, or the
-        robot drives. They are sent at most ``RESETS`` times.
+        The lines are sent at most ``RESETS`` times, until the reset is proved or given up.
         """
         if self._reset_proof is not None and not (self._reset_shown or self._leaving):
             return NO_PACKETS
@@ -338,8 +334,7 @@ class LoisEcuBoard(Board):
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record. A later reading contains the record, or the reason why there is none.
 
-        Raises RequestRefused if the record is too long for the board, or in a terminal mode or
-        during a change of mode.
+        Raises RequestRefused, for example for a record that is too long, or in a terminal mode.
         """
         self._ecu.record(kind, samples)
 

@@ -1,11 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of the kind of board: one with the public firmware, or one as the manual describes it.
+"""Detection of the kind of board.
 
-- Public firmware: an odometry report follows each tick report, with the same command byte (0x12).
-Ticks count only while a wheel is commanded forward.
-
-- Manual: odometry reports have their own command byte (0x20). Ticks count in both directions.
+* Public firmware: an odometry report follows each tick report, with the same command byte (0x12).
+  Ticks count only while a wheel is commanded forward.
+* Manual: odometry reports have the command byte 0x20. Ticks count in both directions.
 """
 
 from typing import Final
@@ -15,10 +14,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports after which an odometry report can show the kind of the board.
-
-With its own command byte (0x20), the report shows a board as in the manual, unless earlier data
-have shown the public firmware.
+"""Number of tick reports after which an odometry report with its own command byte (0x20) shows a
+board as in the manual.
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
@@ -28,8 +25,7 @@ count decreases, the driver decides that the board does not count ticks backward
 class BoardKind:
     """The kind of one board. The detected properties are written into the motion filter ``motion``.
 
-    ``appends``: whether an odometry report with the command byte 0x12 follows each tick report, as
-    in the public firmware.
+    ``appends``: whether an odometry report (0x12) follows each tick report.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -50,8 +46,8 @@ class BoardKind:
     def took_odometry(self, *, appended: bool) -> None:
         """Record an odometry report.
 
-        ``appended``: True if the report has the command byte of a tick report (0x12), as in the
-        public firmware. False if it has its own command byte (0x20).
+        ``appended``: whether it has the command byte of a tick report (0x12, public firmware), not
+        its own (0x20).
         """
         motion = self._motion
         if appended and not self.appends:
@@ -66,10 +62,8 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        It does if wheels that are commanded backward roll ``UNCOUNTED_M`` by the board's odometry,
-        and no count has ever decreased.
-
-        ``told``: changes in the board's odometry since the previous report; None if unknown.
+        It does if wheels roll backward for ``UNCOUNTED_M`` and no count has ever decreased.
+        ``told``: changes since the previous odometry report, or None.
         """
         if told is None or not self._motion.signed or self._seen_signed:
             return

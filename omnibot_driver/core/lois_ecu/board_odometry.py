@@ -2,8 +2,7 @@
 
 """Changes from one odometry report (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware reports whole RPM. By a defect, its position stays the same while both wheels
-have the same speed.
+The public firmware does not update its position while both wheels have the same speed.
 """
 
 import math
@@ -22,9 +21,8 @@ class Told:
 
     * ``turned_m``: how much farther the right rim moved than the left one, in m.
     * ``along_m``: distance that the middle of the axle moved, in m.
-    * ``still``, ``same_velocity``: whether both reports have the same pose, and the same velocity.
-    * ``speeds_mps``: later speeds of the left and right rim, in m/s; None if a speed is not a whole
-      number of RPM.
+    * ``still``, ``same_velocity``: whether pose and velocity are unchanged.
+    * ``speeds_mps``: speeds of both rims, in m/s; None if they are not whole RPM.
     """
 
     turned_m: float

@@ -2,8 +2,8 @@
 
 """Estimation of the delay with which each tick report was read.
 
-The board's time in the report is compared with the arrival time, for two models of the board's
-clock: it always runs (manual), or it stops while the board sends (public firmware).
+The arrival time is compared with the board's clock, which always runs (manual), or stops while the
+board sends (public firmware).
 """
 
 import math
@@ -32,8 +32,8 @@ SAME_READ_S: Final = 0.02
 """Tick reports that arrive within this time in s were probably read together, and late. Only
 the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
-"""Margin in s. The delay of a tick report is irregular if the report is earlier than the fitted
-clock, or its delay longer than the largest recent one, by more than this margin.
+"""Margin in s. A delay is irregular if the report is earlier than the fitted clock, or later than
+the largest recent delay, by more than this margin.
 """
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
@@ -84,8 +84,8 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s by the fitted clock, and whether it is irregular.
 
-        A late read cannot explain an irregular delay. A negative delay means that the report came
-        early. While too few reports are stored, return 0 and False. This report is not stored.
+        A late read does not explain an irregular delay. While too few reports are stored, return 0
+        and False. The report is not stored.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

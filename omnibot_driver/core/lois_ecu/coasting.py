@@ -22,8 +22,7 @@ COAST_PART: Final = 0.35
 class Coasting:
     """A wheel that coasts after a command.
 
-    * ``heard_s``: time in s at which the board reads the command. The power ends at the speed
-      controller's next step.
+    * ``heard_s``: time in s at which the board reads the command.
     * ``speed_mps``: speed at this time, with sign.
     """
 
@@ -33,8 +32,8 @@ class Coasting:
     def unsure_mps(self, now: float, step_s: float) -> float:
         """Return the standard deviation of the speed at ``now``, with the sign of the speed.
 
-        It is half the difference between two extreme cases: a wheel that loses its power at once
-        and brakes hard, and one that loses it after ``step_s`` and brakes gently.
+        It is half the difference between a wheel that brakes hard at once, and one that brakes
+        gently after ``step_s``.
         """
         age_s = now - self.heard_s
         slow_mps = self._speed_after((1 + COAST_PART) * age_s)

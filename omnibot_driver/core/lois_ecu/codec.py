@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Encoding of all messages as lines, and decoding of commands and of reports with only one line.
+"""Encoding of all messages as lines, and decoding of commands and of one-line reports.
 
 Sources: the ECU's manual; for the order of words in a payload, the public firmware.
 """

@@ -2,8 +2,7 @@
 
 """Correction of the motion filter by the board's reports.
 
-While the board counts a wheel's ticks, the count is compared with the filter. Otherwise, the
-changes in the board's odometry (0x20) are compared.
+While the board does not count a wheel's ticks, the board's odometry (0x20) corrects the filter.
 """
 
 import math
@@ -45,9 +44,8 @@ UNFORESEEN_TICKS: Final = 1.5
 keep its speed. The filter then allows for larger changes of the speed.
 """
 UNFORESEEN: Final = 5.0
-"""Difference, in standard deviations, between a reported and an expected count, above which no
-motion can explain it. It may be a sign of a restart, if the counts are near zero and the clock is
-irregular.
+"""Difference, in standard deviations, between a reported and an expected count, that the motion of
+a wheel cannot explain. It may be a sign of a restart of the board.
 """
 SAME_TICKS: Final = 0.6
 """Difference, in ticks, from the expected count, from which an unchanged count corrects the filter.
@@ -55,9 +53,8 @@ Below it, the next tick may not be due yet.
 """
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a report is ignored if its
-heading differs by more than both from the expected one. The board has then used an outdated wheel
-speed.
+"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a report whose heading differs
+from the expected one by more than both is ignored.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -70,19 +67,17 @@ SWERVED_M: Final = 0.05
 oscillating speed, in addition to ``SWINGING_M``.
 """
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviations of a wheel's distance after lost reports, as fractions of the distance that
-the wheel rolls meanwhile: at a steady and at an oscillating speed. Only for a wheel without counted
-ticks.
+"""Standard deviations of a wheel's distance after lost reports, as fractions of the distance rolled
+meanwhile: at a steady and at an oscillating speed. Only for a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""After the board's odometry (0x20) has corrected a wheel's distance by more than
-``CORRECTED_TICKS``, the filter adds an error. Its standard deviation is ``CORRECTED_PART`` times
-the excess. Only for a wheel without counted ticks.
+"""Standard deviation of the error that remains after a large correction of a wheel's distance, as a
+fraction of the excess over ``CORRECTED_TICKS``. Only for a wheel without counted ticks.
 """
 LATE_PART: Final = 0.6
-"""Standard deviation of a wheel's distance after a late report, as a fraction of the distance that
-the wheel rolls during the delay. Only for a wheel without counted ticks.
+"""Standard deviation of a wheel's distance after a late report, as a fraction of the distance
+rolled during the delay. Only for a wheel without counted ticks.
 """
 EQUAL_RPM: Final = 3.0
 """Standard deviation, in RPM, of the difference between the true speeds of the two wheels when the
@@ -118,10 +113,9 @@ class Comparison:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
         Also return whether the difference is too large for an error of the filter. While the board
-        does not count, the difference is 0. The filter is not corrected.
+        does not count, the difference is 0.
 
-        * ``ticks``: reported ticks since the last report.
-        * ``late_s``: how much later than usual the report arrived.
+        ``late_s``: how much later than usual the report arrived.
         """
         motion = self._motion
         wheel, speed = motion.wheels[index], motion.speed_mps(index)
@@ -183,8 +177,8 @@ class Comparison:
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
         """Correct the motion filter by the changes in the board's odometry (0x20).
 
-        * ``duration_s``: time since the last report of this odometry.
-        * ``late_s``: how much later than usual the new report arrived.
+        ``duration_s``: time since the last such report. ``late_s``: how much later than usual the
+        new report arrived.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
@@ -265,8 +259,7 @@ class Comparison:
     def _no_tick(self, duration_s: float, ticks: float) -> None:
         """Correct the filter's wheel speeds towards zero: the board's odometry shows no tick.
 
-        ``ticks``: standard deviation of a wheel's distance since the last report, in ticks. Speeds
-        that the firmware does not measure are not corrected.
+        ``ticks``: standard deviation of a wheel's distance since the last report, in ticks.
         """
         motion = self._motion
         self.begin_odometry()

@@ -171,10 +171,10 @@ class LoisConversation:
 
     @property
     def held_until(self) -> float:
-        """Time at which the caller must call ``receive`` with b"".
+        """Time at which the caller must call ``receive`` with b"" to get the reports that are held
+        back.
 
-        This call returns the readings of the reports that are held back. The time is infinity if
-        there are none.
+        Infinity if there are none.
         """
         return self._decoder.resolves_at
 
@@ -191,8 +191,7 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Old reports do not show it, nor those of the public firmware after a backward command or RPM
-        0/0.
+        Old reports do not, nor those of the public firmware after RPM 0/0 or a backward command.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -246,8 +245,8 @@ class LoisConversation:
     def due(self, now: float, *, proved: bool = True) -> bytes:
         """Return the lines to write now. Called at the time ``wake_at``.
 
-        ``proved``: whether displacements have proved a standstill. A change of mode waits for this
-        proof, but only for 2 s of Stop: in a terminal mode, no displacements arrive.
+        ``proved``: whether displacements have proved a standstill. A change of mode waits for the
+        proof, but for at most 2 s.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal
@@ -278,24 +277,23 @@ class LoisConversation:
     def emergency_stop(self) -> bytes:
         """Return the set-points RPM 0/0; in a terminal mode, return no bytes.
 
-        In a terminal mode, the public firmware reads at most 480 characters a second, so the
-        set-points would delay Stop.
+        There, the set-points would delay Stop: the public firmware reads only 480 characters a
+        second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
+        """Return the lines that command a velocity, as RPM or duty; Stop if it rounds to zero.
 
-        If the velocity rounds to zero, return Stop. Raises CommandRefused for a motion in a
-        terminal mode or during a change of mode.
+        Raises CommandRefused for a motion in a terminal mode or during a change of mode.
         """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Return the lines that command the rates of the left and right wheel, in rad/s.
+        """Return the lines that command the rates of both wheels, in rad/s; Stop if both round to
+        zero.
 
-        If both rates round to zero, return Stop. Raises CommandRefused for a motion in a terminal
-        mode or during a change of mode.
+        Raises CommandRefused for a motion in a terminal mode or during a change of mode.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")

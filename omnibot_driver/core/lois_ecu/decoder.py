@@ -2,8 +2,7 @@
 
 """Decoder that turns a stream of bytes into reports.
 
-A line begins at the last ``:`` before its line feed. The module reads no clock, and no input raises
-an error.
+A line begins at the last ``:`` before its line feed. No input raises an error.
 """
 
 from dataclasses import dataclass, field
@@ -40,9 +39,8 @@ class DecoderStatistics:
 class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
-    * ``sum_required``: whether lines without a checksum are always discarded. If False, they are
-      discarded only while the board sends checksums: such a line may be damaged.
-    * ``ticks_gate``: check of the tick reports.
+    * ``sum_required``: whether to discard all lines without a checksum. If False, they are
+      discarded only while the board sends checksums.
     * ``terminal``: whether text outside the protocol is regarded as a sensor's line, not as damage.
     * ``times``: for each report of the last call, the arrival time of its last line, in s.
     """
@@ -110,8 +108,7 @@ class LoisDecoder:
     def feed(self, data: bytes, now: float) -> list[Report]:
         """Return the reports that ``data`` completes, in the order in which the board sent them.
 
-        A report that may be incomplete is held back until the next line. After a silence, a call
-        with empty ``data`` returns it.
+        A report that may be incomplete waits for the next line, or for a call with empty ``data``.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))

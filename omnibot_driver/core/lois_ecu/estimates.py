@@ -30,7 +30,7 @@ class Estimates:
 
     * ``pose``: pose of the last estimate.
     * ``heading_compared``: whether the board's odometry has corrected the heading since then.
-    * ``late_stddev_s``: standard deviation of the timestamps, in s.
+    * ``late_stddev_s``: standard deviation of the timestamps.
     """
 
     def __init__(self, motion: MotionFilter) -> None:

@@ -2,8 +2,7 @@
 
 """History of the states of a filter.
 
-After a restart of the board that was noticed late, the filter returns to an earlier state. This
-module does not know what a state means.
+After a late detection of a restart, the filter returns to its state before the restart.
 """
 
 from collections import deque
@@ -36,7 +35,7 @@ class FilterHistory:
         """Restore the last state that was stored at ``then_s`` or earlier, or else the oldest
         state.
 
-        Return the time in s at which this state was stored; None if no state is stored.
+        Return the time in s of this state; None if no state is stored.
         """
         if not self._kept:
             return None

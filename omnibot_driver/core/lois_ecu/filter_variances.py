@@ -29,8 +29,8 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: for each wheel, the standard deviation of its speed from the unknown
-    deceleration. The sign is the wheel's direction: the errors of both wheels are fully correlated.
+    ``coasting_mps``: standard deviation of each wheel's speed while it coasts, with the sign of the
+    speed. Both errors are correlated.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

@@ -15,8 +15,7 @@ the date yet."""
 class GpsClock:
     """The date and the time that the GPS receiver reported last.
 
-    ``dated``: whether the last reported date is a real one. It stays the same at midnight, when the
-    date becomes unknown.
+    ``dated``: whether the last reported date is real, even if it is out of date after midnight.
     """
 
     def __init__(self) -> None:
@@ -30,10 +29,9 @@ class GpsClock:
         return self._date is not None
 
     def set_date(self, date: GpsDate) -> None:
-        """Use a reported date.
+        """Use a reported date, unless it is zero or from 2038 on; otherwise, the date is unknown.
 
-        * Zeros or a false year: the receiver has no date yet, so the date is unknown.
-        * From 2038 on: rejected, because such a date does not fit into a ROS time.
+        Without a date, the receiver sends zeros or a false year.
         """
         self.dated = bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
         self._date = date if self.dated else None

@@ -3,8 +3,6 @@
 """Filter of compass headings that rejects the false headings of the public firmware near north.
 
 The firmware averages headings as plain numbers: 359, 1 and 1 degrees give 120.
-
-This module works on degrees and the odometry's yaw.
 """
 
 import math

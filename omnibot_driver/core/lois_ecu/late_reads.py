@@ -20,8 +20,8 @@ read late, and their times are corrected. ``BoardTime`` handles shorter delays.
 """
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor, a little above 1, for times that are computed from the board's clock. If its rate is not
-exact and every read is late, the times would otherwise fall more and more behind the arrivals.
+"""Factor, a little above 1, for times from the board's clock. With an inexact clock rate, the times
+would otherwise fall more and more behind the arrivals.
 """
 
 
@@ -55,7 +55,7 @@ class LateReads:
     ) -> list[float]:
         """Return the times in s of reports that were read together.
 
-        If a clock in ns may have wrapped or restarted, the result is the arrival times.
+        If a clock in ns may have wrapped or restarted, these are the arrival times.
 
         * ``arrived``: for each report, the time in s at which its last line was read.
         * ``unit``: the unit of the board's clock; None if it is unknown at present.
@@ -85,8 +85,7 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether this report was read late: none arrived for ``LATE_S`` before it, and
-          others arrived together with it.
+        * ``late``: whether several reports arrived together after a gap of more than ``LATE_S``.
         * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s
@@ -111,8 +110,7 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        The clock and the tick counts then both begin at zero. The clock alone proves nothing: in
-        ns, it wraps every 4.3 s.
+        Both its clock and its tick counts then begin at zero. A clock in ns also wraps every 4.3 s.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
+"""One line of the protocol: command byte and 32-bit payload, as ASCII hex with a checksum.
 
-``:<command><payload><checksum>\\n`` has 14 characters. Only lines to a board without checksums have
-12.
+``:<command><payload><checksum>\\n`` has 14 characters. Lines to a board may have no checksum.
 """
 
 import re
@@ -52,7 +51,7 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
     """Parse the characters of one line, from ``:`` to the line feed; None if they are not valid.
 
-    A carriage return may precede the line feed. A wrong checksum is never valid.
+    A carriage return may precede the line feed.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END

@@ -2,8 +2,7 @@
 
 """Prediction of the board's own odometry (0x20).
 
-The firmware computes its odometry from the wheel speeds that it measured at the last tick of each
-wheel. This module does not know the board's reports.
+The firmware computes its odometry from the wheel speeds at the last tick of each wheel.
 """
 
 import math
@@ -32,8 +31,7 @@ LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses of a
 wheel faster than ``FAST_TICKS_PER_S``.
 
-While the board sends, it notices a tick late. It does not measure the speed up to the next tick if
-that follows soon.
+While the board sends, it notices ticks late and misses some speeds.
 """
 
 

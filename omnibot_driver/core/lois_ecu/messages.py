@@ -83,7 +83,7 @@ class TerminalMode(IntEnum):
 
     * ``HOST``: the protocol.
     * ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no checksum.
-    * Other modes: data of a device at a serial input of the board.
+    * Other modes: data of a device that is connected to the board.
     """
 
     HOST = 0
@@ -277,8 +277,7 @@ class Ticks:
 class BoardOdometry:
     """The board's own pose and velocity of the robot, in a frame that is fixed to the floor.
 
-    Velocities may be NaN or infinite. ``appended``: whether the command byte was 0x12, as in the
-    public firmware, not 0x20 (manual).
+    Velocities may be NaN or infinite. ``appended``: whether the command byte was 0x12, not 0x20.
     """
 
     x_m: float

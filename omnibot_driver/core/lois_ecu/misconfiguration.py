@@ -56,10 +56,10 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all received bytes. For each decoded report, call ``understood`` and
+    Call ``look`` with all received bytes; for each decoded report, call ``understood`` and
     ``heard``.
 
-    * ``advice``: what the user should check; None without a suspicion.
+    * ``advice``: what the user should check, or None.
     * ``no_ticks``: whether the board sends reports, but no ticks.
     """
 

@@ -2,7 +2,7 @@
 
 """Kalman filter of both wheels' motion, and of the values that the board reports.
 
-The wheels are assumed to have the radius in the settings. Left and right are those of the board.
+Wheels have the radius in the settings. Left and right are those of the board.
 """
 
 import math
@@ -56,9 +56,8 @@ EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
 """Standard deviation that is added to a wheel's excess when its set-point changes.
 
-The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point
-(``EXCESS_MEAN``, ``EXCESS_STDDEV``). First value: for the board's own controller gains. Second
-value: for the user's.
+The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
+First value: for the board's own controller gains. Second value: for the user's.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLS_S: Final = 0.1
@@ -94,8 +93,7 @@ class MotionFilter:
         """Smallest expected difference between the two measured wheel speeds, in m/s, since the
         last comparison of the board's distance.
 
-        At a small value, the public firmware may not have updated its position: it does not while
-        both speeds are equal.
+        While both speeds are equal, the public firmware does not update its position.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
@@ -189,9 +187,8 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Increase the uncertainty of a wheel's distance, and of all states that depend on it.
 
-        * ``stddev_m``: standard deviation to add to the distance.
-        * ``counted``: whether the board counted the wheel's ticks at the time of the error. The
-          count then becomes uncertain too.
+        ``stddev_m``: standard deviation to add. ``counted``: whether the board counted the wheel's
+        ticks at the time of the error; the count then becomes uncertain too.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -286,8 +283,8 @@ class MotionFilter:
         """Reset the speed errors (biases) of these wheels, because the kind of their command has
         changed.
 
-        A bias is a relative error in duty mode. Otherwise, it is the amount by which the firmware
-        rounds down the measured speed, in m/s.
+        A bias is a relative error in duty mode, otherwise the amount in m/s by which the firmware
+        rounds down a speed.
         """
         assert self._kinds is not None
         for index in wheels:
