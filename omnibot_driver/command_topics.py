@@ -30,7 +30,8 @@ def obeying(
     """Return a callback that passes each message to ``action``, and refuses old messages.
 
     * ``expires_s``: returns the age, in s, at which a command expires.
-    * ``may_be_old``, ``is_stop``: return True if the age of a message does not matter.
+    * ``may_be_old``: returns True if the age of a message does not matter.
+    * ``is_stop``: returns True for a command to stop, at any age.
     * ``ends_goal``: returns True if a command ends a goal even when it is refused. May raise
       CommandRefused.
     * ``moves_base``: whether the topic commands the motion of the base.

@@ -149,7 +149,7 @@ class CommandPipeline:
         """Return the command for a body velocity.
 
         ``age_s``: age of the sender's stamp in s; it shortens the time to expiry. Raises
-        CommandRefused.
+        CommandRefused if the stamp or the velocity is not allowed.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s

@@ -68,7 +68,7 @@ class BaseSetpoint:
 
     * The attribute ``is_zero``: whether the command is a standstill.
     * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
-    * ``before``: previous set-point. The ramp starts at its velocity; at rest if it is no body
+    * ``before``: previous set-point. The ramp starts at its velocity; at rest if it is not a body
       velocity.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """

@@ -39,8 +39,8 @@ DIGIT: Final = 6e-4
 The larger one applies, because the board prints few digits.
 """
 HALF: Final = 0.51
-"""Upper limit of this tolerance, in units of the last printed digit: half a unit for rounding, and
-a little for single precision. No limit if the last digit is unknown.
+"""Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last printed digit:
+half a unit for rounding, and a little for single precision. No limit if the last digit is unknown.
 """
 
 
@@ -59,8 +59,8 @@ class Configuration:
         the next report are confirmed.
         """
         self._digits: dict[str, tuple[float, ...]] = {}
-        """For each number in the newest line of a kind: the unit of its last printed digit, such as
-        0.001 for ``0.420``. By keyword.
+        """Unit of the last printed digit of each number, such as 0.001 for ``0.420``, by the
+        keyword of the line.
         """
         self.turned = False
         """Whether the board's ``confs`` line (steering geometry) has the track as its first number.

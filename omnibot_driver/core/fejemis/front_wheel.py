@@ -106,7 +106,7 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        Except for the first, it must be near the last accepted angle, or near a rejected angle
+        Except for the first, an angle must be near the last accepted one, or near a rejected one
         directly before.
         """
         doubted, self._doubted_deg = self._doubted_deg, None

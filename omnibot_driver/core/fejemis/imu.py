@@ -25,8 +25,8 @@ CYCLE_S: Final = 0.0015
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 BLOCK_S: Final = 0.5
-"""Shortest time in s in which the samples of a block arrive. It prevents that the late samples
-after a stall fill a block alone.
+"""Shortest time in s in which the samples of a block arrive. Otherwise, the late samples after a
+stall could fill a block alone.
 """
 EARLY_S: Final = 5e-4
 """If a sample seems early by more than this time, in s, fewer samples were lost before it than

@@ -285,7 +285,8 @@ def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query after ``eer``, the command to load a
     configuration.
 
-    ``eer`` itself has no answer. "unhandled" counts too: some front boards do not know ``fwoi``.
+    The boards do not answer ``eer`` itself. The answer "unhandled" counts too: some front boards do
+    not know ``fwoi``.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -159,7 +159,7 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The voltage may be lowered to ``LEAST_PART * volts``, so that the checksum detects damage.
+    The voltage may be lowered down to ``LEAST_PART * volts``, so that the checksum detects damage.
     """
     if not volts:
         return OFF[0], 0.0

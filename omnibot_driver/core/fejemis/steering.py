@@ -21,8 +21,8 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 angle, in rad, at which a turn on the spot may begin, and may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel, in rad, whose error of the body's velocity is permitted at full
-speed. At larger deviations, the speed is lowered.
+"""Deviation of the front wheel from its target angle, in rad, that is permitted at full speed. At a
+larger deviation, a lower speed keeps the error of the body's velocity as small.
 """
 
 

@@ -62,7 +62,7 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        It does if wheels roll backward for ``UNCOUNTED_M`` and no count has ever decreased.
+        The board does if wheels roll backward for ``UNCOUNTED_M`` and no count has ever decreased.
         ``told``: changes since the previous odometry report, or None.
         """
         if told is None or not self._motion.signed or self._seen_signed:

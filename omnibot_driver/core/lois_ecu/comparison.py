@@ -45,7 +45,7 @@ keep its speed. The filter then allows for larger changes of the speed.
 """
 UNFORESEEN: Final = 5.0
 """Difference, in standard deviations, between a reported and an expected count, that the motion of
-a wheel cannot explain. It may be a sign of a restart of the board.
+a wheel cannot explain. Such a difference may be a sign of a restart of the board.
 """
 SAME_TICKS: Final = 0.6
 """Difference, in ticks, from the expected count, from which an unchanged count corrects the filter.

@@ -191,7 +191,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Old reports do not, nor those of the public firmware after RPM 0/0 or a backward command.
+        Old reports do not show it, nor do those of the public firmware after RPM 0/0 or a backward
+        command.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -277,8 +278,8 @@ class LoisConversation:
     def emergency_stop(self) -> bytes:
         """Return the set-points RPM 0/0; in a terminal mode, return no bytes.
 
-        There, the set-points would delay Stop: the public firmware reads only 480 characters a
-        second.
+        In this mode, the set-points would delay Stop: the public firmware reads only 480 characters
+        a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 

@@ -30,7 +30,7 @@ def twist_variances(
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
     ``coasting_mps``: standard deviation of each wheel's speed while it coasts, with the sign of the
-    speed. Both errors are correlated.
+    speed. The errors of both wheels are correlated.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

@@ -55,7 +55,7 @@ class LateReads:
     ) -> list[float]:
         """Return the times in s of reports that were read together.
 
-        If a clock in ns may have wrapped or restarted, these are the arrival times.
+        If a clock in ns may have wrapped or restarted, the arrival times are returned.
 
         * ``arrived``: for each report, the time in s at which its last line was read.
         * ``unit``: the unit of the board's clock; None if it is unknown at present.
