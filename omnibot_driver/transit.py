@@ -21,7 +21,8 @@ HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
 """Longest pause, in s, in a series of late messages.
 
-If a series lasts ``HEALS_AFTER_S`` (s), the sender's clock was probably set back.
+If a series lasts ``HEALS_AFTER_S`` (s), the sender's clock may have been set back, and its offset
+is estimated anew.
 """
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
@@ -37,7 +38,7 @@ CLOCK_RETREATS: Final = 10.0
 ALIKE_S: Final = 0.02
 """Difference of misfits (``_Sender.misfit_s``) in s up to which two senders fit a message equally.
 
-The driver then assumes the sender whose last message had the higher number.
+The driver then assigns the message to the sender whose last message had the higher number.
 """
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
@@ -105,7 +106,9 @@ class Transit:
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
         """Return the delay of this message, estimated from earlier messages of its sender.
 
-        A sender's first message is assumed to be in time. A delay over ``longest_s`` is late.
+        A sender's first message is assumed to have no delay in transit.
+
+        ``longest_s``: a message with a longer delay is late.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -165,7 +168,7 @@ class _Sender:
         """Return the smallest and the largest possible misfit of a message to this sender, in s.
 
         The misfit is the time by which the message is too late, or ten times (``CLOCK_RETREATS``)
-        the time by which it is too early.
+        the time by which it is too early. Only limits are known, because the clocks drift.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)

@@ -20,7 +20,7 @@ least time between two such lookups."""
 class HostName:
     """The name of a host, and whether the host has left the address ``in_use``.
 
-    A lookup can take long, so one thread at a time does it.
+    A lookup can take long, so it runs in its own thread, and only one runs at a time.
     """
 
     def __init__(self, name: str, in_use: str) -> None:

@@ -129,8 +129,9 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line.
 
-        * A line that does not accept all bytes: the other bytes wait.
-        * Bytes have waited for 0.2 s without a break: they are discarded, and the line is missing.
+        * A line that does not accept all bytes at once: the other bytes wait.
+        * A line whose bytes have waited for 0.2 s without a break: these bytes are discarded, and
+          the line is regarded as missing.
         * A missing line with an open port: only the bytes that the port accepts at once are
           written.
         """

@@ -2,7 +2,7 @@
 
 """How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-The frames do not matter. All times are in s.
+The delivery does not depend on the frames. All times are in s.
 """
 
 from collections.abc import Callable, Iterator

@@ -2,8 +2,8 @@
 
 """Command several robots in turn, 40 times a second each.
 
-Arguments: duration in s, and namespaces. Output: for each namespace, a JSON array of (time of the
-steady clock in s, speed in board units).
+Arguments: duration in s, and namespaces. Output: a JSON list with one array for each namespace.
+The array has an item for each command: (time of the steady clock in s, speed in board units).
 """
 
 import json

@@ -2,8 +2,8 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-The driver and the floor (the smallest equivalent program) each have a controller on UDP. The
-driver's new speed, but not its stop, waits for the reply to a query.
+The driver and the floor (the smallest equivalent program) each have a simulated controller on UDP.
+In the driver, a new speed waits for the reply to a query, but a stop does not.
 """
 
 import time

@@ -2,8 +2,9 @@
 
 """Command several MART robots with the same speed, which changes every 1 to 3 s and may be zero.
 
-Arguments: duration in s, and namespaces. Output: for each namespace, a JSON array of (time of the
-first message with the speed, by the steady clock in s; speed in m/s).
+Arguments: duration in s, and namespaces. Output: a JSON list with one array for each namespace.
+The array has an item for each speed: (time of its first message by the steady clock in s, speed in
+m/s).
 """
 
 import json

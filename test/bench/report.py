@@ -2,8 +2,9 @@
 
 """The performance report, which ``make bench`` writes into docs/internals/performance.md.
 
-``--quick``: only test that the program runs. Exit code 1: a goal is missed. The floor is the
-smallest program with the same output as the driver.
+``--quick``: short measurements, to test that the program runs. Exit code 1: a goal is missed.
+
+The floor is the smallest program with the same output as the driver.
 """
 
 import argparse

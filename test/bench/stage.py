@@ -2,7 +2,7 @@
 
 """Simulated boards on pseudo-terminals that send the stream of nominal mode and record commands.
 
-The boards take turns within each tick. The first word of an IMU frame is a number.
+The boards take turns within each tick. The first word of an IMU frame is the frame's number.
 """
 
 import heapq

@@ -58,7 +58,9 @@ def goes_astray(bench: Bench, command: Triple) -> bool:
 def stopped_after_s(
     bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
 ) -> float:
-    """Command the robot until the driver sends Stop; return the time from the deviation on, in s.
+    """Command the robot until the driver sends Stop.
+
+    Return the time in s from the robot's first deviation from the command to this Stop.
 
     Raises AssertionError if Stop comes before a deviation, or not within 3 s.
     """

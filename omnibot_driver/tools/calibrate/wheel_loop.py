@@ -3,7 +3,7 @@
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
 Units: ticks of 10 ms, encoder counts per tick, PWM steps. A wheel must not change its direction,
-because the dry friction is constant.
+because the dry friction is assumed to be constant.
 """
 
 from dataclasses import dataclass

@@ -19,8 +19,9 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
     ``rows``: rows of successive residuals.
 
-    * ``lags`` is 1: lag 1 is limited to -0.5 (only displaced marks) to 0 (only independent errors).
-    * ``lags`` is larger: a factor decreases the values with the lag.
+    * ``lags`` is 1: the value for lag 1 is limited to the range from -0.5 (only displaced encoder
+      marks) to 0 (only independent errors).
+    * ``lags`` is larger: each value is multiplied by a factor that decreases with the lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -42,7 +43,7 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 def whitener(of_lags: Column, length: int) -> Column:
     """Return the matrix that removes an autocorrelation from a row of ``length`` residuals.
 
-    Its upper left part does so for a shorter row. ``of_lags``: the autocorrelation from lag 0 on.
+    For a shorter row, use its upper left part. ``of_lags``: the autocorrelation from lag 0 on.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]

@@ -29,7 +29,7 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: in the time t, the pose may move JUMP_M + JUMP_MPS · t, in m.
+"""``JUMP_M``, ``JUMP_MPS``: in t seconds, the pose may move by JUMP_M + JUMP_MPS · t, in m.
 
 A larger motion between two messages is a reset of the odometry, and begins a new path.
 """

@@ -19,7 +19,7 @@ repetitions are lost or late."""
 ASLEEP_S: Final = 0.5
 """Longest time in s between two calls of ``command`` while the program runs.
 
-After a longer time, the program was suspended, and earlier keys are discarded.
+A longer time is regarded as a suspension of the program, and earlier keys are discarded.
 """
 DEAF_S: Final = 0.3
 """Time in s for which keys do not steer after the program was suspended.

@@ -2,6 +2,6 @@
 
 """Reports on a drive, from a bag or from a running robot, as a page with pictures and as text.
 
-``bag`` or ``live`` -> ``recorder`` -> ``log`` -> ``judge``, ``plots`` -> ``page``. Only ``live``
-needs ROS.
+Flow of the data: ``bag`` or ``live`` -> ``recorder`` -> ``log`` -> ``judge``, ``plots`` ->
+``page``. Only ``live`` needs ROS.
 """

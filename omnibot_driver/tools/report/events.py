@@ -16,9 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which /diagnostics shows that the driver still runs in its last state.
+"""Age of a state in s from which its report in /diagnostics proves that the driver still runs.
 
-Without this sign, a driver in the state "disconnected" has ended.
+Without such a report, a driver whose last state is "disconnected" has ended.
 """
 
 
@@ -80,7 +80,7 @@ def _lost(states: list[Span]) -> list[Span]:
 def _alive(log: Log, state: Span) -> bool:
     """Return whether the driver was still running in ``state``, the last state in the log.
 
-    /diagnostics then shows the state more than 2 s (``SILENT_S``) after its beginning.
+    It was running if /diagnostics shows the state more than 2 s (``SILENT_S``) after its beginning.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

@@ -72,9 +72,11 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The gains come from constant commands (``STEADY_S``) that are not near zero; from all commands
-    if these last less than ``SUSTAINED_S`` in all. ``usable``: for each measurement, whether to use
-    it.
+    The delay is the one with the best fit. The gain of an axis comes from the times at which its
+    command is constant (``STEADY_S``) and not near zero, or from all times if these last less than
+    ``SUSTAINED_S`` in all.
+
+    ``usable``: for each measurement, whether to use it.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)

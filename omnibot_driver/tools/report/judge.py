@@ -67,7 +67,9 @@ def _all(log: Log) -> Iterator[Finding]:
 def _missing_imu(log: Log) -> Level:
     """Return how severe it is that the log has no message of the IMU.
 
-    GOOD: the board has no IMU. NOTE: unknown. BAD: the board has one.
+    * GOOD: the board has no IMU.
+    * BAD: the board has one, or the log of a single robot has no Stream status.
+    * NOTE: otherwise.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
     told = {any("IMU" in key for key in status.values) for status in streams}

@@ -51,7 +51,8 @@ class Series:
     def other_clock_s(self) -> float:
         """How far the recorder's clock is ahead of the timestamps' clock, in s.
 
-        Differences of up to 1 s (``OTHER_CLOCK_S``) can be delays of the messages, so they give 0.
+        This is the median of arrival time minus timestamp, but 0 if the median is at most 1 s
+        (``OTHER_CLOCK_S``): such a median can be a delay of the messages.
         """
         late_s = (self.arrived_s - self.stamp_s)[np.isfinite(self.stamp_s)]
         ahead_s = float(np.median(late_s)) if len(late_s) else 0.0
@@ -118,7 +119,7 @@ class Log:
 
     ``absent``: topics without a message.
 
-    ``topics``: known topics, with or without messages.
+    ``topics``: topics that exist, with or without messages; empty if unknown.
 
     ``alone``: whether /diagnostics has data of this robot only.
     """

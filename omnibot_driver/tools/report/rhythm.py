@@ -274,7 +274,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    A count that has decreased has restarted at zero, with the driver.
+    A decreased count is regarded as that of a restarted driver, which counts from zero again.
     """
     if not log.alone:
         return None

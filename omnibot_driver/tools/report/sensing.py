@@ -90,7 +90,7 @@ class Spectrum:
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
     """Return Welch's mean spectrum of the selected ``rows``; None if there is too little data.
 
-    Only unbroken pieces of at least 256 readings are used.
+    Only pieces of at least 256 readings without gaps are used.
     """
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
@@ -211,7 +211,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the ratio of turns by gyro to turns by odometry, and the sum of all turns in rad.
 
-    The sum ignores directions. None if the odometry has no turns.
+    Left and right turns both increase the sum. None if the odometry has no turns.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

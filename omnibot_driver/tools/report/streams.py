@@ -33,7 +33,7 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot without this rate: the present rate; NaN for a robot with two wheels.
+        * One robot, no rate in its diagnostics: the present rate; NaN for a robot with two wheels.
         * Several robots: their common rate; NaN if there is none.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]

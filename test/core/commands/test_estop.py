@@ -71,7 +71,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 ) -> None:
     """An e-stop that was latched while the port was closed is sent directly after Stop and S.
 
-    These are the first bytes after each opening of the port.
+    Stop and S (start) are the first bytes after the opening of the port.
     """
     bench.close()
     assert "port is not open" in estop(bench, True)
@@ -102,7 +102,7 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """One notice advises to call ~/reset if the board itself still holds a released e-stop.
+    """One notice advises a call of ~/reset if the board itself still holds a released e-stop.
 
     Such a board ignores all commands until it is reset.
     """
@@ -123,7 +123,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """A robot that speeds up after an e-stop does not cause the notice to call ~/reset."""
+    """A robot that speeds up after an e-stop does not cause the notice that advises ~/reset."""
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)

@@ -84,9 +84,9 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The driver sends no motion frame to a board that boots after a restart.
+    """A restarted board receives no motion frame after a boot of 0.4 s.
 
-    The paused board could read a byte of the frame as the letter S (start).
+    The board is paused then, and could read a byte of the frame as the letter S (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
@@ -104,7 +104,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
     """After a request for a pause or a reset, the driver sends no motion frame.
 
-    The board does not receive the request, and drives on.
+    In this test, the board does not receive the request, and the robot drives on.
     """
     bench.drive(0.4)
     start = len(bench.written)

@@ -198,7 +198,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """A goal that an event such as a reset or an e-stop has discarded is not driven later.
+    """A goal that an event such as a reset or an e-stop has discarded is not driven to later.
 
     The robot rests until a new goal arrives.
     """
@@ -275,7 +275,7 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 ) -> None:
     """A robot that drives away from its goal is stopped, and a notice names the board's switch.
 
-    At velocity control, the board takes a goal for a velocity.
+    If the switch is set to velocity control, the board takes a goal for a velocity.
     """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()

@@ -39,9 +39,9 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """The e-stop is sent twice without delay, just after a command, and then repeated without end.
+    """Even just after a command, the e-stop is sent twice at once, then repeated without end.
 
-    Each is ES and Stop, because some firmware does not know ES.
+    Each transmission is ES and Stop, because some firmware does not know ES.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

@@ -75,9 +75,9 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """After a command has expired, the driver sends Stop at 20 Hz, for 1 s or 5 s.
+    """After a command has expired, the driver sends Stop at 20 Hz, for 5 s.
 
-    1 s is enough after a proof of the stop.
+    1 s is enough if the robot is proved to be at rest.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
@@ -125,7 +125,8 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 ) -> None:
     """After a letter, such as S (start), during a drive, the command is sent again.
 
-    Zeros before the letter may complete a broken frame to a wrong command.
+    Zeros before the letter may complete a broken frame to a wrong command, which the repeated
+    command replaces.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -149,7 +150,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """A motion with a new frame each time, such as a ramp, is sent at the pace of 18 ms."""
+    """A motion whose frames differ, such as a ramp, is sent as one frame every 18 ms."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]

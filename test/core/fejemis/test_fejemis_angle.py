@@ -59,7 +59,7 @@ def test_without_angles_a_command_is_refused_because_of_the_front_board() -> Non
 
 
 def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
-    """If the busy driver reads nothing for 0.1 s, a refusal blames the computer."""
+    """If the driver is late and reads nothing for 0.1 s, a refusal blames the computer."""
     bench = nominal()
     bench.run(0.1)
     bench.read_s = 0.1
@@ -74,7 +74,7 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """After a pause of 80 ms, a refusal names the computer until the front board's port is read."""
+    """After 80 ms without reads, a refusal names the computer until the front board is read."""
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}
     for _ in range(round(0.08 / bench.robot.tick_s)):

@@ -45,7 +45,7 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """The checksum detects the loss of two characters, except for an angle to the right with a 6.
+    """The checksum detects the loss of two characters, except in an angle to the right with a 6.
 
     Then the board reads an angle that is 0° to 10° to the left.
     """
@@ -64,7 +64,7 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """From an angle with a checksum that lost one or two characters, no different angle is read.
+    """From a line with a checksum that lost one or two characters, no different angle is read.
 
     This is true even for the most tolerant parser.
     """
@@ -106,7 +106,7 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
     """From a line without a checksum that lost up to three characters, no angle beyond 90° is read.
 
-    Beyond 90°, the inner wheel would be faster.
+    Beyond 90°, the inner wheel would be faster than the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)

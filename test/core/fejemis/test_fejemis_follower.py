@@ -114,8 +114,8 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The driver stops a robot whose firmware limits the front wheel to 90° in reverse.
 
-    Such a robot turns, and a notice names ``allow_reverse``. After the second stop, motion is
-    refused until ~/start.
+    Such a robot turns instead of reversing. A notice names ``allow_reverse``, and after the second
+    stop, motion is refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
@@ -162,7 +162,7 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
     """Motion that a fault forbids until ~/start is still refused after a reconnect.
 
-    The driver itself starts the board then.
+    The driver itself starts the board after the reconnect, but this does not allow motion.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

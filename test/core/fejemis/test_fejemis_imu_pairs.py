@@ -280,13 +280,13 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lost, repeated and late lines give false pairs only where the stream shows no mistake.
+    """Lost, repeated and late lines give false pairs only if the stream hides the mistake.
 
-    There, one line is late, the other comes less than 5 ms later, and no pose follows in the same
-    read.
+    In such a pair, one line is read late, the other less than 5 ms later, and no pose follows in
+    the same read.
 
-    ``period_s``: period of the reads in s, but not the samples' period; None: each line is read at
-    once.
+    ``period_s``: period of the reads in s, which must differ from the samples' period; None: each
+    line is read at once.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

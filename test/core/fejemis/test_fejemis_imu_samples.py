@@ -48,7 +48,7 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
     """Two late samples do not shift the sampling times of the next ones.
 
-    The third would be 3 ms early if one were lost, which is impossible.
+    If a sample were lost before the third, the third would be 3 ms early, which is impossible.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}
     arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]
@@ -165,7 +165,8 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
     """The two lines of each published sample come from the same cycle of the board.
 
-    Each read has ten samples. 1 % of the lines is lost or repeated in two of the cases.
+    Each read has ten samples. In the case "lost", 1 % of the lines is lost; in the case "twice",
+    1 % is repeated.
     """
     bench = numbered()
     chance = random.Random(5)

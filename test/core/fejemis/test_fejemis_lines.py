@@ -224,7 +224,7 @@ def test_the_limit_of_a_line_does_not_depend_on_the_chunking(
 ) -> None:
     """Lines of about 200 characters are decoded in the same way in whatever pieces they arrive.
 
-    Even a separate line end does not change messages and counts.
+    Even if the line end arrives separately, messages and counts are the same.
     """
     stream = b"\n".join(lines)
     whole, split = FejemisDecoder(), FejemisDecoder()
@@ -262,7 +262,7 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
     """The first heartbeat shows whether the board's lines have checksums.
 
-    The decoder then discards lines that differ from the heartbeat in this.
+    If they have checksums, the decoder discards lines without one; if not, lines with one.
     """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None

@@ -133,9 +133,10 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_two_different_false_poses_in_a_row_move_nothing() -> None:
-    """Two successive poses are false, each in another way, and the robot could have driven to both.
+    """Two different false poses in a row do not move the odometry.
 
-    The wheel speeds contradict the motion to the first one, and the motion between them.
+    The robot could have driven to both, but the wheel speeds contradict the motion to the first
+    pose and the motion between the poses.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
@@ -169,7 +170,7 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 ) -> None:
     """If another program sends ``enc0`` during a drive, ``odom`` does not jump.
 
-    Regression: near the old origin, the odometry went back by the whole distance.
+    Regression: if the robot was near the old origin, ``odom`` went back to this origin.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.0)
@@ -189,10 +190,10 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
     v: float, wait_s: float
 ) -> None:
-    """Another program sends ``enc0`` twice during a drive, the second within three poses.
+    """If another program sends ``enc0`` twice within three poses of a drive, ``odom`` stays right.
 
-    Regression: the second one seemed to contradict the first, and ``odom`` went back by the whole
-    way driven.
+    Regression: the second ``enc0`` seemed to contradict the first, and ``odom`` went back by the
+    whole distance driven.
     """
     bench = nominal()
     bench.drive_on(v, 0.0, 0.8)
@@ -208,8 +209,8 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
     """With reads every 0.15 s, ``odom`` does not jump if another program sends ``enc0``.
 
-    Regression: the first pose of a read had no wheel speeds, because their age came from their
-    arrival.
+    Regression: the first pose of a read had no wheel speeds, because the age of wheel speeds was
+    counted from their arrival.
     """
     bench = nominal()
     bench.drive_on(0.5, 0.3, 0.6)

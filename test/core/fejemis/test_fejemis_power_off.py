@@ -158,7 +158,7 @@ def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_ot
 ) -> None:
     """A power off is forgotten if both boards restart unseen and come back at exchanged ports.
 
-    The driver compares the clock of each board across the ports.
+    The driver compares the time of each board with its earlier time at the other port.
     """
     bench.close()
     bench.speaks = set()

@@ -88,7 +88,7 @@ def test_every_restart_stops_the_robot_and_is_reported(
 ) -> None:
     """A restart of a board during a slow drive is reported, and stops the robot.
 
-    Without the line that reports it, the times in the board's other lines show it.
+    If the board sends no line that reports it, the times in its other lines show the restart.
     """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
@@ -116,7 +116,8 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 ) -> None:
     """A restart while the port is away is detected, and the odometry does not jump.
 
-    After ``away_s`` seconds, the uptime is shorter or longer than before the restart.
+    The port comes back ``away_s`` seconds after the restart. The board's uptime may then be shorter
+    or longer than before.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 1.5)
@@ -184,7 +185,7 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
     """Restart a board while motion is commanded; return the reasons why commands were refused.
 
-    Also check that the robot first drives after the front board is configured.
+    Also check that the robot drives again only after the front board is configured.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)

@@ -33,7 +33,7 @@ def unread(bench: Bench, seconds: float, *, room: int) -> dict[int, bytes]:
 def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> None:
     """Let the driver stall; then let it read the first ``room`` bytes that each board sent.
 
-    ``noticed``: whether the driver notices the stall, or only late reads.
+    ``noticed``: whether the driver notices the stall; if not, only its reads are late.
     """
     held = unread(bench, stall_s, room=room)
     if noticed:
@@ -115,7 +115,7 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """No sample gets a stamp in the time in which the full terminal's buffer lost bytes."""
+    """No sample gets a stamp from the time in which the terminal's full buffer lost bytes."""
     bench = nominal()
     bench.run(1.0)
     begin_s, before = bench.now, len(bench.imu)

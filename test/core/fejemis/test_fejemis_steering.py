@@ -102,7 +102,7 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 ) -> None:
     """The body is not faster than commanded while the front wheel has not reached its angle.
 
-    Tolerance: the effect of 5° at the wheel.
+    Tolerance: the effect of an error of 5° in the wheel's angle.
     """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
@@ -164,7 +164,8 @@ COMMANDS = [
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
     """After 2.5 s, the robot has the commanded speed and turn rate.
 
-    Tolerances: 1.2 % of the outer wheel's speed; 3 % of it, divided by the track width.
+    Tolerance of the speed: 1.2 % of the outer wheel's speed. Tolerance of the turn rate: 3 % of the
+    outer wheel's speed, divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -220,7 +221,7 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
 def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
     """If the front wheel overshoots to 95°, the driver relays at most 90° to the drive board.
 
-    Beyond 90°, the board would turn its inner wheel faster.
+    Beyond 90°, the board would turn its inner wheel faster than the outer one.
     """
     bench = nominal()
     angles_deg = [60.0]
@@ -254,8 +255,8 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
     """A reverse command that the driver has set to zero is not driven later.
 
-    * After the user has set ``allow_reverse``: the robot stays at rest.
-    * The next reverse command: refused until ~/start.
+    The robot stays at rest after the user has set ``allow_reverse``. The next reverse command is
+    refused until ~/start, because the motion monitor has stopped the robot twice.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

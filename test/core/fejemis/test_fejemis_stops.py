@@ -184,7 +184,7 @@ def test_a_start_during_an_estop_is_answered_at_once_and_does_not_end_a_pause() 
 
 
 def test_an_estop_during_a_start_is_its_answer_and_the_pause_continues() -> None:
-    """An e-stop makes a ~/start fail that the drive board has not yet confirmed.
+    """An e-stop makes an unconfirmed ~/start of a paused robot fail.
 
     The answer names the e-stop. The robot stays paused until the next ~/start.
     """

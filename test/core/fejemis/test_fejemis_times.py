@@ -34,9 +34,9 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """The stamps of late and lost lines have small errors, apart from a constant delay.
+    """Although lines are late or lost, stamps have small errors, apart from a constant delay.
 
-    99 % are below 0.05 ms for poses, and below 0.2 ms for IMU samples.
+    99 % of the errors are below 0.05 ms for poses, and below 0.2 ms for IMU samples.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
