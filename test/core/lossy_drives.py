@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""Largest errors of the odometry by the rounding of deltas, in m and in rad.
+"""Largest errors in m and in rad that the rounding of deltas causes in the odometry.
 
 The errors grow with each delta, until the next pose of the board corrects them.
 """

@@ -27,7 +27,7 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 class Line:
     """A simulated board and the odometry from its frames. All readings of its IMU are zero.
 
-    ``loses``: function of a frame's bytes and the time: whether the frame is lost.
+    ``loses``: function that returns, for a frame's bytes and the time, whether the frame is lost.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Line:
         """Whether to command motion: the test wants to drive, and the board runs.
 
         Otherwise zeros are commanded: a paused board may take a byte of a motion command for a
-        letter.
+        letter such as P.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

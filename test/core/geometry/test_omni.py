@@ -27,7 +27,7 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
     """The wheel rates are the rim speeds of the manual's equations, divided by the wheel radius.
 
-    Rim speeds: A and B ∓cos 30° Vx - sin 30° Vy - L Ω, C Vy - L Ω. L is the base radius.
+    Rims A and B move at ∓cos 30° Vx - sin 30° Vy - L Ω, and rim C at Vy - L Ω. L: base radius.
     """
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -91,7 +91,7 @@ def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
     """In a left turn at 1 rad/s, each rim moves at -L m/s, where L is the base radius in m.
 
-    The right turn is the manual's «rotate all».
+    The right turn, with all wheels forward, is the manual's «rotate all».
     """
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

@@ -43,7 +43,10 @@ def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
 
 
 def test_what_the_steered_wheel_does_to_the_body() -> None:
-    """A wheel 0.5 m before the axle, at 1 m/s and 45°, gives the robot 0.707 m/s and 1.41 rad/s."""
+    """A wheel 0.5 m in front of the axle, at 1 m/s and 45°, moves the robot at 0.707 m/s.
+
+    The robot turns at 1.41 rad/s.
+    """
     twist = ROBOT.steered_twist(1.0, math.pi / 4)
     assert triple(twist) == pytest.approx((math.sqrt(0.5), 0.0, math.sqrt(2.0)))
 

@@ -179,7 +179,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
     """The driver estimates the gyro bias only at rest, and only while ``auto_gyro_bias`` is on.
 
-    After 15 s, the estimate is half of the true bias.
+    After 15 s at rest, the estimate is half of the true bias.
     """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)

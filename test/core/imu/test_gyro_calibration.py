@@ -161,7 +161,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A calibration that gaps in the readings restart again and again fails at its time limit.
+    """If gaps in the readings restart the calibration again and again, it fails at its time limit.
 
     The bias stays as it was, and the message names the gaps.
     """

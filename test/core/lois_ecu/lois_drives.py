@@ -77,7 +77,7 @@ VARIED = (
 )
 """Names of motions in ``test/integrity/lois_odometry.py``: drives of 5 m, and turns of 80° to 400°.
 
-The seed of a motion sets its speed, and the curvature or angle.
+The seed of a motion sets its speed, and the curvature of a curve or the angle of a turn.
 """
 
 
@@ -122,8 +122,9 @@ class Drive:
 
     ``true``: true pose at the time of the last estimate.
 
-    ``way_m``, ``turned_rad``: true length of the path, and sum of all true turns without their
-    signs.
+    ``way_m``: true length of the path.
+
+    ``turned_rad``: sum of the absolute values of all true turns.
     """
 
     true: Pose

@@ -33,7 +33,7 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware)
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
     """After a turn in place, the estimated angle is right within 3 %.
 
-    The public firmware counts no ticks of the wheel that rolls back.
+    This holds although the public firmware counts no ticks of the wheel that rolls back.
     """
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
@@ -51,7 +51,7 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
     """The covariance fits the pose error of wheels of wrong sizes that slip on uneven ground.
 
-    Only one in 10,000 drives fails by chance.
+    At the limit of this test, only one in 10,000 drives fails by chance.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
@@ -86,7 +86,7 @@ def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
 ) -> None:
     """The odometry stays accurate if one byte in a hundred is lost.
 
-    Later tick counts include the ticks of the damaged reports, about half of all.
+    About half of the reports are damaged, but later tick counts include their ticks.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)

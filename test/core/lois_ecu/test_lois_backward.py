@@ -21,9 +21,10 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """After a backward drive, the distance is right within 3 %, and the position within 10 % of it.
+    """After a backward drive, the distance is right within 3 %.
 
-    The public firmware then counts no ticks, and reports integer RPM.
+    The mean error of the position is below 10 % of the distance. The public firmware counts no
+    ticks in such a drive, and reports integer RPM.
     """
     seeds = (1,) if firmware == "documented" else (1, 2)
     drives = [driven(firmware, "reverse", seed) for seed in seeds]
@@ -39,7 +40,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
     """The covariance fits the error of the pose, also with the gains that the board boots with.
 
-    The right wheel then stops, but has a reported speed.
+    With these gains, the right wheel stops, but the board still reports a speed for it.
     """
     ours = LoisEcuSettings()
     names = {1000: "place right", 1003: "straight back", 1004: "curve back", 1001: "place right"}
@@ -51,7 +52,7 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance() -> None:
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again() -> None:
     """The odometry detects that a wheel has stopped, although the board still reports 20 RPM.
 
-    The heading would otherwise be wrong by 600°.
+    Otherwise, the estimated heading would be wrong by 600°.
     """
     one = motion(nominal("firmware", 2020), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -61,7 +62,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """The odometry detects that a wheel was at rest before the driver started it again.
 
-    The distance since the reported speed last changed is subtracted.
+    The odometry subtracts the distance that it has added since the reported speed last changed.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -71,7 +72,7 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
     """The driver uses all of the reports that a busy computer reads at once, every 0.05 to 0.35 s.
 
-    Otherwise, the position would be wrong by 4 m.
+    The reports show each wheel that stops. Otherwise, the position would be wrong by 4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m
@@ -81,7 +82,7 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
     """A wheel that was found at rest is not assumed to roll because the board's heading differs.
 
-    The board computes its heading from the old speed of the wheel.
+    The board's heading is wrong: the board computes it from the old speed of this wheel.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)
@@ -114,7 +115,7 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> None:
     """The distance is right within 3 % if wheels roll backward at twice the commanded speed.
 
-    The board's odometry (0x20) shows the speed, although ticks are missing.
+    The board's odometry (0x20) shows the speed, although the firmware counts no ticks.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", 2), motors=motors), "reverse", HOST_GAINS)
@@ -126,7 +127,7 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed() -> N
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
     """Above 50 RPM, the board's own heading (0x20) leads to a larger yaw variance.
 
-    At 62 RPM, ticks are too close for the firmware to measure all speeds.
+    At 62 RPM, some ticks follow each other so soon that the firmware measures no speed from them.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

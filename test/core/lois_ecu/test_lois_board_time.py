@@ -46,7 +46,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """The driver estimates a standard deviation of 5 to 25 ms for reads up to 30 ms late."""
+    """For reads up to 30 ms late, the estimated standard deviation of the delay is 5 to 25 ms."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -123,7 +123,7 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
     """If reads are often up to 0.1 s late, one more read that is 0.1 s late is not irregular.
 
-    A read that seems 0.06 s early is irregular.
+    A read that seems 0.06 s early is irregular: late reads do not explain it.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

@@ -62,7 +62,7 @@ def test_the_variances_of_the_twist_are_honest_while_the_robot_coasts(
 ) -> None:
     """The variances of the twist include the unknown time at which the board cuts the power.
 
-    This is the next step of the board's controller.
+    After a Stop, the board cuts the power only at the next step of its controller.
     """
     errors = squared_errors(firmware, vx_mps, yaw_rate_radps)
     assert len(errors) >= 5 * STOPS

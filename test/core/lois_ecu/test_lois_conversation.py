@@ -36,7 +36,7 @@ RPM = math.tau / 60
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     """After the port is opened, the driver configures the board, and the robot can be driven.
 
-    Configured: low-pass gain, periods of the messages, gains of the controllers.
+    The driver writes the low-pass gain, the message periods and the controller gains.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
@@ -117,8 +117,8 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """A robot whose user has switched the checksums off can be driven.
 
-    The command, 0x11 with 4, also overwrites the "short correction" of the left wheel, which is
-    restored.
+    The driver selects lines without checksums by command 0x11 with value 4. This overwrites the
+    "short correction" of the left wheel, so the driver writes it again.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver.confirmed:
@@ -177,8 +177,8 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
 
-    The firmware still uses the last measured speed, so the wheels get no power without
-    feed-forward.
+    The firmware still uses the last measured speed, which is higher. Without feed-forward, the
+    wheels then get no power.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

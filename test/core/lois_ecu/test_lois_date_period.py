@@ -2,7 +2,7 @@
 
 """Tests of the period with which the board sends the GPS date, and of requests for one date.
 
-Such a request confirms the board's settings, and ends the periodic dates.
+The driver requests one date to confirm the board's settings. This ends the periodic dates.
 """
 
 import pytest
@@ -39,7 +39,8 @@ class DeafBench(Bench):
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """The board has the right period of the date even if one of the lines with the period is lost.
 
-    A request for one date has ended the periodic dates.
+    The driver sends this line several times after a request for one date, which ends the periodic
+    dates.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):

@@ -64,7 +64,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
     """The decoder returns a plausible group of lines as soon as its last byte arrives.
 
-    Exception: the first group of each kind waits for the next line or a silence.
+    Exception: the first group of each kind waits for the next line or for a silence.
     """
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
@@ -217,8 +217,8 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
     """The decoder drops a report whose tick counts jump, and returns the next report.
 
-    If the next report continues the old counts, the jump was an error; otherwise the board has
-    restarted.
+    If the next report continues from before the jump, only the dropped report was wrong. If it
+    continues from after the jump, the board has restarted.
     """
     decoder = LoisDecoder()
     said = [
@@ -249,7 +249,7 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """The decoder counts a valid line of unknown kind or with a value out of range as unknown."""
+    """A valid line of unknown kind or with a value out of range is counted, and gives no report."""
     total = 0
     for character in line[:11]:
         total ^= character
@@ -296,7 +296,7 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None:
     """A line that lost two characters is not taken for a line without a checksum.
 
-    Real lines without a checksum are accepted after a few of them.
+    Real lines without a checksum are accepted after a few of them have come.
 
     Bug: zero ticks became 57 ticks, because the checksum was read as a part of the value.
     """

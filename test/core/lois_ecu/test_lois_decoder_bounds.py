@@ -89,7 +89,7 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
     """A torque sample of 0/0 does not end a record.
 
-    The manual and the firmware use different command bytes.
+    The manual and the firmware have different command bytes for these records. Both are tested.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

@@ -40,7 +40,8 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
     """After a change to duty mode in a forward drive, odometry follows a backward drive.
 
-    While its RPM target is positive, the public firmware counts all ticks as forward.
+    The driver clears the RPM target of the forward drive. While it is positive, the public firmware
+    counts all ticks as forward.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)

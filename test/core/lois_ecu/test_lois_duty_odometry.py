@@ -32,7 +32,7 @@ def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
 def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
     """Odometry includes a forward drive by duty in which the firmware counts no ticks.
 
-    The board's own odometry (0x20) does not change in such a drive.
+    The board's own odometry (0x20) does not change either. The driver does not take this for rest.
     """
     one = by_duty([(3.0, PUSH)], seed)
     assert one.way_m > 0.7
@@ -41,9 +41,10 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
 
 
 def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_scale() -> None:
-    """Stop does not reduce the uncertainty of ``duty_scale``, which is 30 % for each wheel.
+    """In a drive by duty just after Stops, the covariance includes the error of ``duty_scale``.
 
-    In the drive that follows, no ticks are counted.
+    This error is 30 % (standard deviation) for each wheel. A Stop, although a duty, does not reduce
+    it. No ticks are counted.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     assert bench.written[-1][1].startswith(b":0100000000")

@@ -69,7 +69,7 @@ class Reports:
 def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
     false_rpm: int,
 ) -> None:
-    """The odometry does not follow the far too high first speed that is reported at a start.
+    """The odometry does not follow the first reported speed of a starting wheel, which is too high.
 
     The board measures the pause before the first tick wrongly, because its timer wraps.
     """
@@ -105,7 +105,7 @@ def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
 
 
 def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
-    """When forward wheels are commanded backward, reported speeds show how far they roll forward.
+    """After a change from forward to backward, reported speeds show how far the wheels roll out.
 
     The board reports these speeds with the sign of the new set-point.
     """
@@ -124,9 +124,9 @@ def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
 
 
 def test_wheels_that_roll_out_backward_do_not_move_forward_by_their_ticks() -> None:
-    """When backward wheels are commanded forward, the ticks still count as backward motion.
+    """After a change from backward to forward, ticks of wheels that roll out are backward motion.
 
-    The reported speeds show that the wheels still roll backward.
+    The board counts them upward, but its speeds show that the wheels still roll backward.
     """
     reports = Reports()
     reports.order(-20, -20)

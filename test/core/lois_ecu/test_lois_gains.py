@@ -69,7 +69,7 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
     """All settings reach the board, although a busy computer sends each round without a pause.
 
-    Only the last line requests a date: the board receives nothing while it sends a date.
+    Only the last line of a round requests a date: the board receives nothing while it sends a date.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
@@ -106,7 +106,7 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 
 @pytest.mark.parametrize("reads_s", [0.001, 0.01, 0.07])
 def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
-    """A setting follows a Stop by at least 15 ms, unless the driver is called too seldom.
+    """A setting is sent at least 15 ms after a Stop, unless the driver is called too seldom.
 
     Bug: the low-pass followed the first Stop at once. If fourteen characters were lost, the rest of
     both lines could command full duty.
@@ -157,7 +157,7 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
     """A Stop in the other form of lines is never in the same write as a setting.
 
-    The two lines could otherwise lose characters and command full duty.
+    If both lines lost characters, the rest could command full duty.
     """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)

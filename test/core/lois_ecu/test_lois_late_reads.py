@@ -322,7 +322,7 @@ def test_a_full_buffer_leaves_an_error_that_the_covariance_describes(
 ) -> None:
     """The covariance covers the motion in reports that the kernel's full buffer has lost.
 
-    Later counts show the distance and the turn, but not the path.
+    The next counts show the distance and the turn, but not the path.
     """
     bench = Bench(firmware)
     error_m, stddev_m = stalled_drive(bench, stall_s, twist)

@@ -73,9 +73,10 @@ def test_the_twist_of_a_silent_board_may_also_be_zero() -> None:
 
 @pytest.mark.parametrize("gap_s", [0.6, 0.75])
 def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: float) -> None:
-    """A gap below 1 s in a steady drive adds less than 10° to the heading's standard deviation.
+    """In a steady drive, a gap below 1 s adds less than 10° to the heading's standard deviation.
 
-    The heading's error is below 10° too. In a longer gap, the board could restart unseen.
+    No reports arrive in the gap. The heading's error is below 10° too. In a longer gap, the board
+    might have restarted.
     """
     for phase in range(8):
         rig = Rig(nominal("firmware"), HOST_GAINS)
@@ -128,7 +129,7 @@ def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports
 def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
     right_rpms: tuple[int, ...], more_deg: float
 ) -> None:
-    """A gap of 0.9 s in a drive backward raises the standard deviation of the heading.
+    """In a drive backward, a gap of 0.9 s between reports raises the heading's standard deviation.
 
     The increase is larger if a wheel's speed went up and down before the gap.
     """

@@ -278,9 +278,9 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 
 @BOTH
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
-    """With ``inverted``, the board's left wheel is the robot's right wheel: the yaw changes sign.
+    """With ``inverted``, the driver takes the board's left wheel for the robot's right wheel.
 
-    The simulated board is not inverted.
+    The simulated board is not inverted, so the estimated yaw has the wrong sign.
     """
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)
@@ -294,7 +294,7 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A report with too many ticks increases the variance of the predicted speeds.
+    """A report with more ticks than expected increases the variance of the predicted speeds.
 
     With the board's own gains, a wheel's speed may oscillate between two reports.
     """

@@ -60,7 +60,7 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
 @pytest.mark.parametrize("name", TALKS)
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_loss_of_up_to_two_characters_makes_another_line(name: str, with_sum: bool) -> None:
-    """If lines lose up to two characters, the firmware accepts only lines that the driver sent.
+    """If up to two characters are lost, the firmware accepts only lines that the driver sent.
 
     Only lenient firmware is tested, because it accepts every line that strict firmware accepts.
     """
@@ -91,7 +91,7 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """A lost run as long as one line can join two set-points to a wrong set-point.
+    """A loss of adjacent characters, as many as a line has, can join two set-points to a wrong one.
 
     The driver therefore sends set-points at least 18 ms apart.
     """
@@ -101,9 +101,10 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 
 
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
-    """A lost run of fourteen characters can join a Stop and the low-pass after it to full duty.
+    """If fourteen adjacent characters are lost, a Stop and a low-pass line can command full duty.
 
-    The driver therefore leaves at least 15 ms between them. The other order does no harm.
+    The driver therefore sends a setting at least 15 ms after a set-point. If the low-pass comes
+    first, there is no danger.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
@@ -117,9 +118,10 @@ def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> No
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """A lost run as long as one line can join a motion line and an LED line to a wrong motion line.
+    """A loss of adjacent characters can join a motion line and an LED line to a wrong motion line.
 
-    The driver therefore leaves at least 15 ms between them. The other order does no harm.
+    As many characters are lost as one line has. The driver therefore sends an LED line at least
+    15 ms after a motion line. If the LED line comes first, there is no danger.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

@@ -153,7 +153,7 @@ def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
 def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
     """All reports of a late read that may contain a restart get the time of the read.
 
-    In the last report, the clock (in ns) and the counts are near zero.
+    In its last report, the clock (in ns) and the counts are near zero, as after a restart.
     """
     late_reads = LateReads(per_turn)
     for number in range(6):

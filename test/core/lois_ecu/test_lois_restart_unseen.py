@@ -105,7 +105,7 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 
 
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
-    """A restart at a wrap of the clock is not noticed, and the covariance covers the error.
+    """A restart just when the clock wraps is not noticed, and the covariance covers the error.
 
     Wheels that rolled back would give the same clock and counts.
     """

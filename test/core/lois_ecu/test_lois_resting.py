@@ -43,7 +43,8 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
     """After a fall to 28 RPM, many repetitions prove that the wheel is at rest.
 
-    No rolling wheel is that steady.
+    No rolling wheel is that steady. The board has measured the 28 RPM wrongly: a wheel does not
+    stop directly from such a speed.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0

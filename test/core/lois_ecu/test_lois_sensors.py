@@ -113,8 +113,8 @@ def test_false_headings_at_north_are_refused() -> None:
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
     """Headings of 120° are accepted after a reset of the odometry.
 
-    The driver rejects 120° only near north, where a board may report 120° falsely. The reset does
-    not change the expected heading.
+    The driver rejects 120° only while it expects north, because a board that faces north may report
+    120° falsely. The reset does not change the expected heading, which is 120°.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

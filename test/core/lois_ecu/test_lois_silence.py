@@ -65,7 +65,10 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """Ticks that the board counts during a lost connection give the distance, within a tenth."""
+    """Ticks that the board counts while the connection is lost show the driven distance.
+
+    The position is right within a tenth of this distance.
+    """
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m

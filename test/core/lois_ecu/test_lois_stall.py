@@ -101,7 +101,7 @@ def looks_stalled(
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
     """A wheel whose reported speed never changes while the other wheel ticks looks stalled.
 
-    The pose of the firmware changes too, but only by the old speed.
+    The firmware's pose changes too, but it is computed from the old speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
@@ -128,7 +128,7 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel at a constant speed above its set-point does not look stalled.
 
-    The wheel does if the other wheel's speed changes meanwhile.
+    It looks stalled if the other wheel's speed changes meanwhile.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -144,16 +144,16 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
     """Two wheels at about 1.3 times their set-points do not look stalled; one such wheel does.
 
-    Wheels that roll backward can be too fast by about the same factor.
+    In backward motion, both wheels can really roll too fast, by about the same factor.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel that the odometry assumes to be at rest looks stalled just above its set-point.
+    """A wheel that the odometry assumes to be at rest looks stalled if it cannot start by itself.
 
-    At this reported speed, the speed controller gives no power.
+    Its reported speed is just above its set-point, so the speed controller gives no power.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -163,7 +163,7 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
     """A wheel at rest whose last reported speed is below its set-point does not look stalled.
 
-    By this speed, the controller gives power, and the wheel starts by itself.
+    The controller uses this speed, so it gives power, and the wheel starts by itself.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -193,8 +193,10 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 ) -> None:
     """A wheel whose fast reported speed stays the same may be at rest, or may roll steadily.
 
-    * For a wheel at rest, the driver sends RPM 0/0, because the old speed may prevent power.
-    * For a wheel that rolls, the odometry keeps the distance.
+    The driver provides for both cases:
+
+    * The wheel may be at rest: the driver sends RPM 0/0, because the old speed may prevent power.
+    * The wheel may roll: the odometry keeps the distance.
 
     ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. A wheel at −68 RPM
     gets full power.

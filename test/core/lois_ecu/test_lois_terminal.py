@@ -62,7 +62,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
     """The driver writes a terminal mode only after the robot's standstill is proved.
 
-    In a terminal mode, the board reports no motion. No "unconfirmed" stop is logged.
+    In a terminal mode, the board reports no motion. No notice says that the stop is unconfirmed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, drive_s)
@@ -219,8 +219,8 @@ def test_a_terminal_mode_refuses_a_reset_at_once(firmware: str) -> None:
 def test_a_record_that_was_given_up_is_dropped_when_it_comes() -> None:
     """A record that the driver has given up is dropped when it arrives.
 
-    The drive mode has changed during the record. The record still shows that the board is
-    connected.
+    The driver has given it up because the drive mode changed. The record still shows that the board
+    is connected.
     """
     bench = Bench("firmware")
     bench.record(RecordKind.TORQUE, 60)

@@ -46,9 +46,10 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """While the robot drives, a session with an unconfirmed board never wakes up at once.
+    """While the robot drives, the next wake-up of the session is always in the future.
 
-    The pacer would otherwise run again and again.
+    The board has not confirmed its settings, which are not repeated in a drive. The pacer must not
+    run again and again because of them.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
@@ -74,7 +75,8 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """While the robot drives, the LED's line comes at least 14.5 ms after a motion line.
 
-    The board may miss bytes for up to 13 ms, and could join the rest of both lines.
+    The board may miss all bytes for up to 13 ms. It could read the rest of both lines as a wrong
+    motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

@@ -2,8 +2,8 @@
 
 """A model of a MART server, its network and its driver, for a search of all reachable states.
 
-A *world* is the state of all three, and a *step* leads to the next world. Without a clock, a late
-copy of a command arrives at any later step, or is lost.
+A *world* is the state of all three, and a *step* leads to the next world. The model has no clock: a
+late copy of a command arrives at any later step, or is lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -82,7 +82,7 @@ Step = tuple[str, World]
 def ready(world: World, word: str) -> bool:
     """Return whether the modelled driver may send ``word``, by the rules of the real driver.
 
-    Before some commands, the driver waits for harmful late copies, and checks the IMU.
+    Before some commands, the driver waits until no harmful late copy is left, and checks the IMU.
     """
     driver = world.driver
     row = BY_TEXT[word]
@@ -209,9 +209,10 @@ def sweeps_first(driver: Driver) -> bool:
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which, after the stop port, the driver finds out the motion in progress.
+    """Return the step in which the driver finds out which motion is in progress.
 
-    A lost reply is not modelled, because it would not change the world.
+    The driver does this after a stop on the stop port. A lost reply is not modelled, because it
+    would not change the world.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -280,8 +281,9 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply may belong to an earlier command. Such a reply never answers a
-    check, a controlled move or MSM.
+    ``late``: whether the reply may belong to an earlier command. Such a reply is never taken for
+    the answer to a check, a controlled move or MSM. A check or a move takes longer than a reply can
+    be late.
     """
     driver = world.driver
     state = driver.state

@@ -47,18 +47,18 @@ Each is disturbed in a trial of its own. Regular queries and their replies are n
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
 
-The driver's check before each start must find an older failure.
+If the IMU failed earlier, the driver's check before the start must find it.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """Commands that the server executes when the driver starts, one in each trial; empty for none."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Durations in s of the network's first interruption, which begins with the driver."""
+"""Durations in s of the network's first interruption, which begins when the driver starts."""
 BACK_S: Final = (0.2, 0.7, 30.0)
 """Times in s from the end of the network's first interruption to the second, which lasts 1 s.
 
-30 s is after the end of a trial.
+With 30 s, the trial ends before the second interruption.
 """
 ENDS_S, SETTLED_S = 16.0, 1.5
 
@@ -182,8 +182,8 @@ def eights() -> Iterator[Trial]:
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials in which a user commands ``wishes``, and one datagram is disturbed.
 
-    Each fate of each of the first datagrams (``MOST_DATAGRAMS`` for each wish) has a trial, in both
-    directions.
+    The first datagrams of each direction are disturbed, at most ``MOST_DATAGRAMS`` for each wish.
+    There is one trial for each of them and each fate.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

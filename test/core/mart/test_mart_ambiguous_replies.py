@@ -28,7 +28,7 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
     """The reply to the first stop shows whether the motion had begun before this stop.
 
-    "No motion" in reply to a second stop proves nothing: the first stop may have ended the motion.
+    "No motion" in reply to a second stop does not: the first stop may have ended the motion.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True

@@ -330,7 +330,7 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
     """The driver accepts an early failure of the IMU check, but no early ``ok``.
 
-    A successful check takes some time. A robot without an IMU fails at once.
+    A successful check takes some time, but without an IMU, the check fails at once.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -68,7 +68,8 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 ) -> None:
     """If the IMU dies in a motion, the driver stops the robot and refuses motion until a restart.
 
-    "source" reports headings only in forward drives.
+    The server variant "source" reports headings only in forward drives, so it is tested only with
+    these.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

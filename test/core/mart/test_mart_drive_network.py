@@ -29,7 +29,7 @@ def seconds_to_move(bench: MartBench, vx: float, limit_s: float = 9.0) -> float:
 def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_second(
     vx: float, firmware: Firmware
 ) -> None:
-    """With delays of up to 0.3 s, the driver stops none of four drives.
+    """If each datagram is late by up to 0.3 s, the driver stops none of four drives.
 
     At most one drive still has a wrong speed after 5 s.
     """

@@ -68,7 +68,7 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """A start reaches the server at most 0.2 s, plus the network delays, after a check of the IMU.
+    """A start reaches the server at most 0.2 s, plus network delays, after the end of an IMU check.
 
     The network is slow and loses datagrams.
     """
@@ -90,7 +90,10 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """A start that is lost after a curve is sent again. Meanwhile, the odometry does not turn."""
+    """A start that is lost after a curve is sent again.
+
+    Meanwhile, the server reports the last heading of the curve. The odometry does not turn by it.
+    """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
     bench.run(2.0)
@@ -114,7 +117,10 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the encoder moves, the first heading of a drive is used, even an unchanged heading."""
+    """The first heading of a drive is used even if it equals the last heading before the drive.
+
+    It could be an old heading, but the encoder shows that the drive has begun.
+    """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
     bench.run(2.0)
@@ -157,7 +163,7 @@ def test_diagnostics_have_the_rate_of_odom() -> None:
 def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
     """The robot reaches two goals within 10 cm and 6 degrees.
 
-    A twist command replaces a third goal.
+    During the drive to a third goal, a twist command replaces this goal.
     """
     bench = MartBench(firmware).ready()
     for x_m, y_m, yaw_rad in ((0.8, 0.4, 1.0), (0.0, 0.0, 0.0)):

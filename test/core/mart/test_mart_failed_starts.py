@@ -45,7 +45,7 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """If a later RM was obeyed, a motion without a command does not show a defective server.
+    """If the server obeyed an RM after it rejected one, a push does not show a defective server.
 
     A defective server rejects RM (forward drive), and moves the robot nevertheless.
     """

@@ -74,7 +74,10 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
-    """If a motor is stuck, both motors are switched off, and the covariance covers the turn."""
+    """If one or both motors are stuck, the driver switches both motors off.
+
+    Before this, the left wheel may turn the robot. The covariance covers this turn.
+    """
     bench = MartBench(firmware).ready()
     if driving:
         bench.command(0.3, 0.1, 3.0)

@@ -66,7 +66,8 @@ def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
 ) -> None:
     """A slow stop of a heavy robot does not discard the next goal.
 
-    The server reports a failure, and one notice says that the wheels still turned.
+    The server reports a failure, and one notice says that the wheels still turned. The robot
+    reaches the goal.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     bench.command(*before, 3.0)
@@ -138,9 +139,10 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn with a wrong rate is started again with other motor units, even without an angle.
+    """A turn with a wrong rate is started again with other motor units, even without its angle.
 
-    The reply to a slow or delayed stop has no angle. The encoder then shows the motors' speed.
+    The angle is missing if a heavy robot stops too slowly, or if the reply to the stop is late. The
+    encoder then shows the motors' speed.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)
@@ -171,7 +173,7 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
 def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
     """Every reply shows that the server is not silent, even a reply without a measurement.
 
-    The last reply before the gap has only the server's name.
+    The last reply before the silence has only the server's name.
     """
     bench = MartBench().ready()
     bench.speaks = False

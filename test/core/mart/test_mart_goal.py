@@ -98,7 +98,7 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
     """A goal that is not reached after ``MOST_MOVES`` moves is discarded.
 
-    The network loses every straight move. A notice has the remaining distance.
+    The network loses every straight move. A notice says how far away the goal is.
     """
     bench = MartBench().ready()
     receive = bench.robot.receive
@@ -114,7 +114,7 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
     """A straight move that is stopped after 80 s (about 20 m) does not use up the moves to a goal.
 
-    The moves are counted from zero again.
+    The driver then counts the moves from zero again, so they suffice for a far goal.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

@@ -87,7 +87,7 @@ def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -
 
 
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
-    """If a tenth of all datagrams is lost each way, at most one of twelve goals is discarded.
+    """If a tenth of all datagrams is lost, at most one of twelve goals is discarded.
 
     The covariance covers the error of the odometry.
     """
@@ -172,7 +172,7 @@ def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
 def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_before(
     word: bytes, later_s: float
 ) -> None:
-    """A reset after a move that runs twice does not add the first run to the pose.
+    """If the odometry is reset after a move has run twice, the first run is not added to the pose.
 
     The reset comes before the driver reads the encoder.
     """
@@ -292,7 +292,7 @@ def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware
 def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
     """An answer to a HELLO sent before a move does not prove that no copy of the move runs.
 
-    The server answers HELLO before it runs the copy.
+    The server answers HELLO before it runs the copy. The driver stops the copy.
     """
     bench = MartBench("source").ready()
     network, late = bench.robot.network[0], list[bytes]()

@@ -80,7 +80,7 @@ def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
     """Without a dock, the robot drives no farther than the permitted distance.
 
-    Obstacles do not end a docking move, and the server's moves go too far.
+    The server's moves go too far, so the driver requests less. Obstacles do not end a docking move.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))

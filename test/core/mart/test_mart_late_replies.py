@@ -143,7 +143,8 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """The goal is not discarded although all replies come 0.28 s late.
 
-    A quick answer to a stop after the move shows that no second run was stopped.
+    After each move, the driver sends a stop, because a second run may have begun. A quick answer
+    shows that there was none.
 
     ``copied``: whether the network duplicates the move. The first run is then added to the
     odometry.

@@ -14,9 +14,9 @@ pytestmark = pytest.mark.slow
 def outlived(
     firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
 ) -> MartBench:
-    """Return a bench with a server whose stop port hangs since the IMU died in a motion.
+    """Return a bench with a server whose stop port has hung since the IMU died in a motion.
 
-    The IMU works again.
+    Now the IMU works again.
     """
     bench = MartBench(firmware, NetworkFaults(delay_s=delay_s), seed=seed).ready()
     bench.command(*motion, 2.5)
@@ -87,7 +87,9 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
     met: bytes, wait_s: float, delay_s: float
 ) -> None:
-    """A driver that starts during RM or B with a dead IMU, and hangs the server, refuses motion.
+    """A driver whose stop makes the server hang, because the IMU is dead, refuses motion.
+
+    The driver starts while the server executes RM or B. The stop port hangs, too.
 
     ``wait_s``: time in s from the driver's start until the IMU works again.
     """
@@ -126,7 +128,7 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
-    """A server whose process stood still for 5 s at rest is driven again.
+    """A server whose process stood still for 5 s while the robot was at rest is driven again.
 
     The server's answers to old queries are not taken for replies to stops, which would show that
     the stop port may hang.

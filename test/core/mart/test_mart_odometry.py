@@ -239,7 +239,7 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
     """After a reset of the odometry during a controlled move, the covariance covers the error.
 
-    The encoder count at the end also contains the distance before the reset.
+    The encoder count at the end of the move also contains the distance before the reset.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -285,7 +285,7 @@ def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
 def test_the_covariance_includes_a_change_that_is_carried_out_twice(
     command: tuple[float, float],
 ) -> None:
-    """The covariance covers the turn if the network delivers a change of the units twice.
+    """If a change of the motors' units arrives twice, the covariance covers the resulting turn.
 
     The robot drives backward, so nothing measures the turn. Only the second answer shows the copy.
     """
