@@ -2,11 +2,8 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-At times, the public firmware does not count the ticks of a wheel. During these times,
-``motion_filter`` predicts the motion from the commands. ``comparison`` corrects this prediction by
-the board's own odometry (0x20).
-
-The caller passes the time. All times are arrival times in s.
+While the public firmware counts no ticks, the motion is predicted from the commands, and corrected
+by the board's own odometry (0x20). All times are arrival times in s; the caller passes the time.
 """
 
 import math
@@ -29,20 +26,17 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""How long the driver predicts the pose after the last report: ``UNHEARD_GROUPS`` periods of the
-tick reports, but at least ``UNHEARD_S`` seconds. The last report can be a tick report or an
-odometry report."""
+"""The driver predicts the pose for this number of tick report periods after the last report of any
+kind, but for at least ``UNHEARD_S`` seconds."""
 LOST_REPORTS_S: Final = 1.2
-"""Limit in s for the duration of a silence of the board. If the silence was shorter and no
-set-point changed in it, the driver assumes that only the reports were lost, and that the wheels
-followed their set-points."""
+"""Longest silence of the board, in s, that lost reports alone explain, if no set-point changed in
+it. The driver then assumes that the wheels followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
-"""Largest tick count, in turns of the wheel, that is a sign of a restart of the board while the
-robot is at rest. After a restart, the counts begin at zero; a larger count may come from a push of
-the robot. The limit is at least one tick."""
+"""Largest tick count, in turns of the wheel, that can show a restart of the board at rest. A larger
+count may come from a push. The limit is at least one tick."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -60,10 +54,8 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. If one read contains ticks and then
-        an odometry report, the ticks give an estimate, and the report corrects the motion before
-        this estimate. The correction needs the wheels' ``blind`` flags, so these flags are cleared
-        only when time passes."""
+        """Whether no time has passed since the last estimate. An odometry report in the same read
+        can then still correct the motion, so the wheels keep their ``blind`` flags."""
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -154,9 +146,8 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether a restart of the board is the only explanation for counts near zero.
 
-        The counts must differ from the predicted counts by more than the wheels can have rolled. If
-        the robot is at rest, they must also be very small, because larger counts may come from a
-        push.
+        The counts must contradict the predicted motion. At rest, they must also be at most
+        ``NUDGED_TURNS``.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -170,9 +161,7 @@ class LoisOdometry:
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
         """Add an error to each wheel's distance, because the board may have restarted unnoticed.
 
-        The error is the difference between the wheel's reported and expected tick count. The driver
-        does not know the cause of this difference: either the board has restarted and counts from
-        zero, or the wheel has really moved.
+        The error is the difference between the reported and the expected tick count.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -263,8 +252,8 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process an odometry report. It corrects the predictions and estimates that follow.
 
-        According to the manual, an odometry report is a message 0x20. The public firmware sends a
-        message 0x12 instead, directly after the ticks.
+        The message is 0x20 in the manual, but 0x12, directly after the ticks, from the public
+        firmware.
 
         ``late_s``: how much later than usual the report arrived, in s.
         """
@@ -309,9 +298,7 @@ class LoisOdometry:
     def _was_silent(self, now: float) -> bool:
         """Return whether a report at ``now`` ends a silence in which the motion is unknown.
 
-        The motion is known if the silence was shorter than ``LOST_REPORTS_S``, and no set-point
-        changed in it. If a set-point changed, the motion is unknown, because the board may not have
-        received the new set-point.
+        The motion is known in a silence shorter than ``LOST_REPORTS_S`` without a new set-point.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if not now > heard_s + self._unheard_s > -math.inf:
@@ -323,7 +310,7 @@ class LoisOdometry:
     def _after_silence(self, now: float) -> None:
         """Add errors to the wheels' distances after a silence in which the motion is unknown.
 
-        A Stop may have been lost in the silence, so the wheels may have rolled until now.
+        The wheels may have rolled until now, because the board may not have received a Stop.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:

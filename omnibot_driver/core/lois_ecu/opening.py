@@ -2,8 +2,8 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-All settings are written several times (in rounds). The driver also requests the GPS date. The
-settings are confirmed when a date has arrived, and ticks arrive with the set period.
+Each setting is written in several rounds. A GPS date, and ticks with the set period, confirm the
+settings.
 """
 
 import math
@@ -37,16 +37,15 @@ LINE_S: Final = 0.02
 # the end of another line could form a motion command. Even the beginning of a Stop is dangerous:
 # with the end of a setting, it could command full duty.
 AFTER_SET_POINT_S: Final = 0.015
-"""Shortest time in s from a set-point to a setting, and from a motion command to a *side command*.
-Side commands are neither set-points nor settings: for example, a command for the LED. The time
-between two set-points is longer, so the driver can send another line between them."""
+"""Shortest time in s from a set-point to a setting, and from a motion command to a *side command*:
+neither a set-point nor a setting, but for example a command for the LED."""
 LONGEST_WAIT_S: Final = 0.5
 """Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
 may be due each time that a setting could be sent."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s from a tick report to the next round of settings, and from a report of any kind to a
-request for a date. The driver uses the delays in turn: the board cannot receive while it sends, and
-with a constant delay, it could be sending at every round."""
+"""Delays in s, used in turn, from a tick report to the next round of settings, and from any report
+to a request for a date. A constant delay could always meet a report: the board cannot receive while
+it sends."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
@@ -101,8 +100,7 @@ class SettingsWriter:
     def ignored(self) -> bool:
         """Whether the board seems to ignore the settings.
 
-        This is the case if the driver has sent the settings in twice the usual number of rounds,
-        and they are still not confirmed.
+        The settings are still unconfirmed after twice the usual number of rounds.
         """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
 
@@ -115,10 +113,8 @@ class SettingsWriter:
     def _waits(self) -> bool:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
-        While the robot drives, no round begins after ``ROUNDS`` rounds have been written, because
-        each written gain resets the controller of a wheel. But a round that has begun is completed:
-        the terminal mode at its beginning overwrites the left short correction, which a later line
-        of the round writes again.
+        While the robot drives, no round begins after the first ``ROUNDS``: each written gain resets
+        the controller of a wheel.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
@@ -154,8 +150,8 @@ class SettingsWriter:
     def repeat(self, now: float) -> None:
         """Write all settings again, as soon as no motion is commanded.
 
-        The caller calls this method if a wheel does not start. A possible cause is that all lines
-        with the low-pass coefficient were lost, so the board does not have this coefficient.
+        For a wheel that does not start: the board may have lost all lines with the low-pass
+        coefficient.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
@@ -196,8 +192,7 @@ class SettingsWriter:
     def ticks_came(self, now: float) -> None:
         """Record the arrival of ticks, and check whether they come with the period in the settings.
 
-        While the settings are unconfirmed, this method also decides when the next round of settings
-        is sent.
+        While the settings are unconfirmed, also schedule the next round.
         """
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
@@ -233,10 +228,8 @@ class SettingsWriter:
     def _encoded(self, command: Command) -> bytes:
         """Return the line of ``command``. Return both forms of a mode that is not confirmed.
 
-        A board that has just booted verifies checksums. So it obeys only a line with a checksum,
-        also if this line tells it to expect no checksums from now on.
-
-        A Stop gets the form that the settings exclude (see ``_begin_round``).
+        A board that has just booted obeys only a line with a checksum. A Stop gets the other form
+        (see ``_begin_round``).
         """
         if command == outbound.STOP:
             return encode_command(command, with_sum=not self.settings.with_sum)
@@ -248,13 +241,10 @@ class SettingsWriter:
     def _begin_round(self, now: float) -> None:
         """Queue all settings for the next round.
 
-        Do nothing if no round is left, or if some commands of the previous round still wait to be
-        sent.
+        Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
-        Another program may have left the board with the other form of lines (``checksum``) while
-        the robot rolls. This board ignores each Stop of the driver. So while the settings are
-        unconfirmed, each of the first ``ROUNDS`` rounds begins with a Stop in the other form. A
-        board that expects the usual form ignores this line.
+        The first ``ROUNDS`` unconfirmed rounds begin with a Stop in the other form of lines
+        (``checksum``), for a board that another program has set to this form.
         """
         if self._queue or not self._rounds_left:
             return
@@ -273,12 +263,9 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round, in an order that changes from round to round.
 
-        The board receives nothing while it sends. With a constant order, a board that sends a
-        report at the same time in each round could miss the same line each time.
+        With a constant order, a board that sends could miss the same line in each round.
 
-        The request for a date comes last. The board answers it at once, and would miss a setting
-        that follows directly. Pauses between the lines do not prevent this, because a busy computer
-        may write all lines of a round together.
+        The request for a date comes last: the board answers at once, and would miss the next line.
         """
         rest = list(self.commands())
         place = rounds * len(rest) // ROUNDS % len(rest)

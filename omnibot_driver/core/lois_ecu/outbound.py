@@ -28,16 +28,14 @@ MOST_PERCENT: Final = 100
 # After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""Number of times that RPM 0/0 is sent after a Stop: more than once, because lines may be lost. If
-the robot stays stopped, RPM 0/0 is sent alone. If the robot drives again before this number is
-reached, RPM 0/0 is sent directly before each of the next RPM set-points."""
+"""Number of times that RPM 0/0 is sent after a Stop, because lines may be lost. If the robot drives
+again earlier, the rest is sent directly before its next RPM set-points."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
     """Return a pair of values, limited to ±``most`` and rounded, and whether it was limited.
 
-    If one value exceeds ``most``, both values are reduced by the same factor. So their ratio is
-    kept.
+    The limit reduces both values by the same factor.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0

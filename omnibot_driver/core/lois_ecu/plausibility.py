@@ -2,10 +2,8 @@
 
 """Plausibility of a complete report: its values, and their change since the last report.
 
-If two successive reports fit each other, but not the last accepted report before them, this module
-assumes that the board has restarted or was reset.
-
-This module works on values and arrival times.
+Two successive reports that fit each other, but no earlier ones, show a restart or a reset of the
+board. This module works on values and arrival times.
 """
 
 import math
@@ -32,22 +30,17 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time. The rate can be below 1,
 because the clock of the public firmware stops while the board sends."""
 SURE_AFTER: Final = 2
-"""Number of pairs of tick reports that must confirm the unit of the board's clock. A first pair
-shows the unit, and this number of further pairs must show the same one. Before that, the unit is
-not regarded as known."""
+"""Number of pairs of tick reports that must confirm the unit of the board's clock, after a first
+pair has shown it. Until then, the unit is unknown."""
 LEARNT_FROM_S: Final = 0.15
 """Shortest time in s between two tick reports from which the unit of the board's clock is inferred.
 Over a shorter time, the errors of the arrival times are too large."""
 ROLLED_OUT_TURNS: Final = 0.15
 ROLLED_OUT_TICKS: Final = 1
 STARTING_TURNS_PER_S: Final = 1 / 3
-"""``ROLLED_OUT_TURNS``, ``ROLLED_OUT_TICKS``, ``STARTING_TURNS_PER_S``: terms of the largest
-plausible count of a wheel after a restart of the board.
-
-The restart sets the count to zero. After it, the wheel may still roll out, and may start again. So
-at ``age`` s after the restart, the largest plausible count is ``ROLLED_OUT_TURNS +
-STARTING_TURNS_PER_S * age`` turns, plus ``ROLLED_OUT_TICKS`` ticks.
-"""
+"""Terms of the largest plausible count of a wheel, ``age`` s after a restart of the board:
+``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, plus ``ROLLED_OUT_TICKS`` ticks. The count
+starts at zero."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -111,13 +104,14 @@ class Gate(Generic[Group]):
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of the reports of encoder ticks. ``ticks_per_revolution`` may be replaced at any time.
+    """Check of the reports of encoder ticks.
 
-    The times in the reports show whether the board's clock counts ms or ns. Later reports must
-    then show the same unit.
+    Later reports must fit the unit of the board's clock, once it is known.
 
-    ``too_fast``: number of reports in a row that were rejected although their clock is plausible.
-    Their counts show a speed that no wheel can have.
+    ``ticks_per_revolution``: may be replaced at any time.
+
+    ``too_fast``: number of reports in a row that were rejected for an impossible speed, although
+    their clock is plausible.
     """
 
     def __init__(self, ticks_per_revolution: int) -> None:

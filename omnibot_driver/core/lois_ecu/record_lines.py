@@ -24,14 +24,14 @@ RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 @dataclass(slots=True)
 class GroupStatistics:
-    """Counters of groups and records since this object was created. A group of lines is one report.
+    """Counters of groups and records since this object was created.
 
-    ``damaged_groups``: number of discarded groups and records. ``damaged_records``: number of
-    discarded records alone.
+    A group is the lines of one report.
 
-    ``implausible``: number of complete groups with values that are not plausible.
-
-    ``unknown_lines``: number of valid text lines that are not a report.
+    * ``damaged_groups``: number of discarded groups and records.
+    * ``damaged_records``: number of discarded records alone.
+    * ``implausible``: number of complete groups with values that are not plausible.
+    * ``unknown_lines``: number of valid text lines that are not a report.
     """
 
     damaged_groups: int = 0
@@ -73,7 +73,7 @@ class RecordAssembler:
     def add(self, code: int, payload: int) -> list[Record | LostRecord]:
         """Add a line. If it ends the record, return a list with the record, else an empty list.
 
-        If the record is damaged or not expected, the list contains a LostRecord instead.
+        A LostRecord replaces a damaged or unexpected record.
         """
         if not self.begun:
             self._begin(code)
@@ -95,8 +95,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The last line of a torque record looks like a sample of 0/0. So such a line is regarded as
-        the last one only if all expected samples have arrived before it.
+        The last line of a torque record looks like a sample of 0/0. It ends the record only after
+        all expected samples.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -2,8 +2,7 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-Each request restarts the record, so a late repetition would delay the record. The repetitions
-therefore follow quickly.
+The repetitions follow quickly, because each one restarts the record.
 """
 
 import math
@@ -30,9 +29,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which the driver sends a request, counted from the first sending. The intervals are
-longer than the longest time in which the board cannot receive. They are not multiples of the usual
-periods of the board's reports."""
+"""Times in s, from the first sending, at which the driver sends a request. Each interval is longer
+than the board can be unable to receive."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Unit, in s, of the times in an RPM record. It follows from the unit of the board's clock in its
 tick reports (0x12)."""
@@ -86,8 +84,8 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings ``found``, with the result of the request if it is known now.
 
-        A record that was not requested is removed from the readings. If no reading is left, but
-        lines of a record are arriving, a RecordComes is returned.
+        An unrequested record is removed. While lines of a record arrive, RecordComes replaces an
+        empty result.
 
         ``prevented``: why the board cannot send the record, as a sentence; empty if it can.
         """

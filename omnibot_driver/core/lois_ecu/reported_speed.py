@@ -2,10 +2,7 @@
 
 """Corrections of one wheel's estimated motion by the speeds that a LOIS ECU reports for the wheel.
 
-The board measures a wheel's speed only at the wheel's encoder ticks. Two errors follow from this:
-
-- While a wheel is at rest, the board keeps reporting its last speed.
-- While the board sends, it notices ticks late, and therefore measures a wrong speed.
+The board repeats the last speed of a wheel at rest, and measures wrong speeds while it sends.
 
 This module knows reported speeds and the motion filter; it does not know messages.
 """
@@ -18,12 +15,11 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Age in s that the driver assumes for the values in an odometry report when the report's last line
-arrives. The values are that old because the board takes them before it sends the first line."""
+"""Assumed age in s of the values in an odometry report when its last line arrives. The board takes
+the values before it sends the first line."""
 DOUBT: Final = 3.0
-"""Limit for the difference between a reported value and the value that the filter expects, in
-standard deviations. If the difference is larger, the filter's estimate is probably wrong, so the
-filter increases the variance of this estimate."""
+"""Largest usual difference between a reported and an expected value, in standard deviations. After
+a larger difference, the filter increases the variance of its estimate."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used. A slower wheel may have rested between its last two
 ticks."""
@@ -33,8 +29,7 @@ SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
 """``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, from one reported
-speed to the next. A larger change is not real: the board has noticed a tick late, and therefore
-measured a wrong speed."""
+speed to the next. A larger change shows that the board has noticed a tick late."""
 FIRST_RPM: Final = 8.0
 FIRST_PART: Final = 2.0
 """``FIRST_RPM + FIRST_PART * expected``: largest plausible first speed, in RPM, of a wheel that
@@ -42,8 +37,7 @@ starts."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported
-and an expected speed. The driver uses this limit only if two conditions are true: the set-point is
-constant, and the user has set the controller's gains."""
+and an expected speed, with a constant set-point and gains from the user."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks that the driver subtracts from a wheel's distance when the wheel has come to
 rest. The wheel has rolled less far than its last reported speed suggests."""
@@ -52,9 +46,8 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed value of a speed controller's integral while its wheel does not tick, as a
-fraction of ``WINDUP_M``. The controller integrates the speed error of a wheel at rest. When the
-integral reaches ``WINDUP_M``, the controller starts the wheel."""
+"""Largest assumed integral of a speed controller while its wheel does not tick, as a fraction of
+``WINDUP_M``. At ``WINDUP_M``, the controller starts the wheel."""
 
 
 class ReportedSpeed:
@@ -75,8 +68,8 @@ class ReportedSpeed:
         self.misleads = False
         """Whether the board's last heading contains such a speed."""
         self._doubted_m = 0.0
-        """Standard deviation in m that the driver has added to the wheel's distance, because the
-        wheel may be at rest. It is 0 again after each change of the wheel's reported speed."""
+        """Standard deviation in m that was added to the wheel's distance, because the wheel may be
+        at rest. A change of the reported speed sets it to 0."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
@@ -91,9 +84,7 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance that was added wrongly.
 
-        Usually, the distance since the wheel's reported speed last changed is wrong. If the driver
-        has since sent a command to start that the wheel did not obey, only the distance since this
-        command is wrong.
+        The distance since its last certain motion (``rolled_to_m``) is wrong.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -111,8 +102,8 @@ class ReportedSpeed:
     def judge(self, speed_mps: float, duration_s: float) -> None:
         """Decide whether a reported speed is plausible. Call this before ``take``.
 
-        An implausible speed is rejected once, because the next one is another measurement. But
-        while the board reports the same implausible speed, the wheel has not ticked again.
+        After a rejected speed, a different speed is accepted without a check: it is a new
+        measurement.
         """
         motion, before_mps, misled = self._motion, self._rejected_mps, self._false
         self._rejected_mps, self._false, self.misleads = None, False, misled
@@ -187,8 +178,7 @@ class ReportedSpeed:
     def _starts_too_fast(self, told_rpm: float) -> bool:
         """Return whether the first speed of a wheel that starts is implausible.
 
-        The board computes this speed from the time since the wheel's last tick, long ago, and its
-        timer wraps every 6.6 s. So the speed may have any value.
+        The board's timer wraps every 6.6 s, so the speed may have any value after a long rest.
         """
         motion, wheel = self._motion, self._wheel
         if self._told or wheel.rolls_on or wheel.course.kind != "rpm":
@@ -221,10 +211,8 @@ class ReportedSpeed:
     def _doubt_rolling(self, chance: float) -> None:
         """Add an error to the distance of a wheel that is estimated as rolling, but may be at rest.
 
-        If the wheel is at rest, the whole distance since its reported speed last changed is wrong.
-        The standard deviation of this error is ``chance`` times the distance; the errors of
-        successive reports are not independent. The board's odometry (0x20) does not show the error,
-        because the board also computes with the old speed.
+        The standard deviation becomes ``chance`` times the distance since the reported speed last
+        changed. The board's odometry (0x20) does not show this error.
 
         ``chance``: probability that the wheel is at rest.
         """

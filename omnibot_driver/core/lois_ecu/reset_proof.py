@@ -2,9 +2,7 @@
 
 """Proof, by the tick counts, that the board has obeyed a reset.
 
-A count near zero after the reset proves nothing if the count was also near zero before the reset.
-
-This module knows counts and times.
+Counts near zero prove nothing if they were near zero before. This module knows counts and times.
 """
 
 import math
@@ -15,23 +13,19 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 # A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
 FEW_TURNS: Final = 0.3
 FEW_TICKS: Final = 2
-"""``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS`` ticks: the longest distance that a wheel is
-assumed to roll after it was stopped. At 50 RPM, the wheel needs 0.4 s for it. A count up to this
-value is regarded as near zero."""
+"""``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS`` ticks: largest count that is regarded as near
+zero. A stopped wheel is assumed to roll at most this far."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
-"""``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: a distance that no wheel can roll
-between a reset and the next counts. The board has obeyed the reset if a count has fallen by at
-least this distance, and is then near zero."""
+"""``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: smallest fall of a count, to near
+zero, that proves a reset. No wheel can roll as far until the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count that can prove the
-reset of a robot at rest. The reset is proved if a count was at least this large before, and both
-counts are zero afterwards. A smaller change may come from the backlash of the gears."""
+"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count of a robot at rest
+that proves a reset, if both counts are zero afterwards. Backlash changes a count by less."""
 UNPROVED_S: Final = 2.5
-"""Time in s for which the driver waits for a proof. After this time, it accepts counts near zero
-without a proof. The reason: if the counts were already near zero before the reset, no proof is
-possible."""
+"""Time in s after which the driver accepts counts near zero without a proof. No proof is possible
+if the counts were already near zero before the reset."""
 
 
 class ResetProof:
@@ -39,7 +33,7 @@ class ResetProof:
 
     ``before``: the counts when the reset was sent; None if they are unknown.
 
-    ``steady``: whether ``before`` had not changed for some time. If so, the wheels were at rest.
+    ``steady``: whether ``before`` had not changed for some time, so that the wheels were at rest.
 
     ``ticks_per_revolution``: encoder ticks for one turn of a wheel. It may be changed at any time.
     """
@@ -53,9 +47,8 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver repeats the reset.
 
-        ``before``: the counts at the time of the repetition. They replace the earlier counts only
-        if they can prove the reset: the wheels are at rest (``steady``), and the larger count
-        reaches the limit of ``STEADY_TURNS`` and ``STEADY_TICKS``.
+        ``before``: the counts at the repetition. They replace the earlier counts if they can prove
+        the reset, with the wheels at rest (``steady``).
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady
@@ -64,8 +57,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the result of the reset now.
 
-        The counts ``ticks`` must be near zero. They must also prove the reset, but only until
-        ``UNPROVED_S`` has passed. After this time, no proof is necessary.
+        The counts ``ticks`` must be near zero, and must prove the reset. After ``UNPROVED_S``, no
+        proof is necessary.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -2,8 +2,8 @@
 
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-When a wheel stops, the public firmware keeps reporting the last speed that it measured. This speed
-is usually between 5 and 17 RPM, and lower than the speed that was reported before it.
+The public firmware repeats the last speed of a stopped wheel: usually 5 to 17 RPM, after a higher
+one.
 
 This module works on reported speeds and the time between them.
 """
@@ -15,8 +15,7 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
 """``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the last speed that the board measures before a
-wheel stops. A wheel with a speed below this range is starting. A wheel with a speed above this
-range still rolls, and at least one more tick follows, if the speed was measured correctly."""
+wheel stops. Below the range, the wheel is starting; above it, the wheel still rolls."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -24,16 +23,14 @@ WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 LOST_REPORTS: Final = 4
 LOST_S: Final = 0.25
-"""Limit in s for the mean time between the last ``LOST_REPORTS`` reports. Above this limit, reports
-were lost, or the board rarely sends reports. Late reads hardly change the mean of four reports."""
+"""Largest usual mean time in s between the last ``LOST_REPORTS`` reports. Above it, reports are
+lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
-"""Usual longest time in s between two reports. This module forgets speeds after ``WITHIN_S`` by its
-own clock. While reports are lost, each report advances this clock by at most ``REPORT_S``, so the
-speeds from before a gap are not forgotten."""
+"""Usual longest time in s between two reports. While reports are lost, each report advances this
+module's clock by at most ``REPORT_S``, so that speeds from before a gap are kept."""
 HIDDEN_PART: Final = 0.3
 """Speed of this module's clock, as a fraction of real time, while the board does not report the
-wheel's speed. Because of the slow clock, the module keeps the speeds from before this time for
-longer."""
+wheel's speed. The slow clock keeps earlier speeds for longer."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -42,28 +39,20 @@ FASTER: Final[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 1.0)
 FELL_IN_GAPS: Final[tuple[float, ...]] = (0.0, 0.6, 0.8, 0.9, 1.0)
 GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1.0)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that a wheel is at rest. The index is the number of times that the reported speed
-has been repeated. The values were counted on the public firmware, except for ``FASTER``. They
-depend on how the reported speed last changed:
+"""Probabilities that a wheel is at rest, by the number of times that its reported speed was
+repeated. ``FASTER`` is assumed; the others were counted on the public firmware. They depend on the
+last change of the reported speed:
 
-``FAST``: after a fall to a speed above ``FAST_RPM``.
-
-``FAR``: after a fall by at least ``FELL_FAR_RPM``.
-
-``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
-
-``NEAR``: after a smaller fall.
-
-``FELL_IN_GAPS``: while reports are lost, after a smaller fall, or after a fall from a speed that
-was reported only once. The true fall may be larger than the reported one.
-
-``GAPS``: while reports are lost, without a reported fall. The speed may have fallen in a gap.
-
-``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. A wheel with such
-a speed rolls on, unless the speed is wrong. It is wrong if the board noticed the second-to-last
-tick late. These values were not counted, but assumed.
-
-``TUNED``: after any fall, if the user set the gains.
+* ``FAST``: after a fall to a speed above ``FAST_RPM``.
+* ``FAR``: after a fall by at least ``FELL_FAR_RPM``.
+* ``LONE``: after such a fall from a speed that was reported only once.
+* ``NEAR``: after a smaller fall.
+* ``FELL_IN_GAPS``: while reports are lost, after a smaller fall, or after a fall from a speed that
+  was reported only once.
+* ``GAPS``: while reports are lost, without a reported fall.
+* ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. The wheel rolls
+  on, unless a late tick has made the speed wrong.
+* ``TUNED``: after any fall to a speed below ``FASTEST_RPM``, if the user set the gains.
 """
 
 

@@ -17,25 +17,20 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop until RPM 0/0 is sent. During this time, the tick counts can show the
-standstill. After RPM 0/0, the public firmware does not count ticks any more."""
+"""Time in s from a Stop until RPM 0/0 is sent. RPM 0/0 ends the counting of ticks, which can show
+the standstill."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
 class SetPoints:
     """Encoder of set-points. It also remembers which set-points were sent.
 
-    ``saturated``: number of commands that were slowed, because a value was above its limit.
-
-    ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-    none was sent. RPM 0/0 is sent ``CLEAR_AFTER_S`` after this time. If RPM 0/0 must be repeated,
-    ``clears`` sets a later time.
-
-    ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
-
-    ``moved_at_s``: time of the last motion command.
-
-    ``said_at_s``: time of the last set-point, also of a zero one.
+    * ``saturated``: number of commands that were slowed, because a value was above its limit.
+    * ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
+      none was sent. ``clears`` moves it later to repeat RPM 0/0.
+    * ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
+    * ``moved_at_s``: time of the last motion command.
+    * ``said_at_s``: time of the last set-point, also of a zero one.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

@@ -22,22 +22,14 @@ user does not set one."""
 class LoisEcuSettings:
     """Settings of a LOIS ECU and its robot.
 
-    ``inverted``: whether the board's left wheel is the robot's right wheel.
-
-    ``max_duty``: largest duty of a motor, in percent.
-
-    ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
-
-    ``low_pass``: 0..1, the part of a new set-point that the controller applies in each step. The
-    board boots with the value 0. In RPM mode, the wheels do not turn until a larger value is
-    written.
-
-    ``written``: further settings that the user wants on the board.
-
-    ``periods_ms``: periods of the board's messages that the user wants. The driver writes no other
-    period.
-
-    ``declination_rad``: angle from true to magnetic north, east positive.
+    * ``inverted``: whether the board's left wheel is the robot's right wheel.
+    * ``max_duty``: largest duty of a motor, in percent.
+    * ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
+    * ``low_pass``: 0..1, the part of a new set-point that the controller applies in each step. At
+      0, the value after a boot, the wheels do not turn in RPM mode.
+    * ``written``: further settings that the user wants on the board.
+    * ``periods_ms``: periods of the board's messages that the user wants; no others are written.
+    * ``declination_rad``: angle from true to magnetic north, east positive.
     """
 
     wheel_radius_m: float = 0.13

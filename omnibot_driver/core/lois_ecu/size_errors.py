@@ -2,10 +2,8 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-For each error, the robot's path is computed again with the positive and with the negative error.
-The covariance is the spread of the poses in which these paths end.
-
-Input: distances of the wheels; output: covariance of x, y and yaw.
+The covariance is the spread of paths that are each computed with one error. Input: distances of the
+wheels; output: covariance of x, y and yaw.
 """
 
 import math
@@ -54,11 +52,7 @@ class SizeErrors:
         ]
 
     def covariance(self, yaw_rad: float) -> Covariance:
-        """Return the covariance of the pose, in the frame in which the robot's yaw is ``yaw_rad``.
-
-        This class computes its copies of the path in a frame of its own, which may be turned
-        against the caller's frame. The method turns the result into the caller's frame.
-        """
+        """Return the covariance of the pose, in a frame in which the robot's yaw is ``yaw_rad``."""
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw
         cos, sin = math.cos(turn), math.sin(turn)

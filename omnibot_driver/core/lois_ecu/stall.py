@@ -27,20 +27,17 @@ set-point is never regarded as stalled, because it may show no motion although i
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""Two limits of a reported speed. The first limit is the set-point times ``TOO_FAST``. The second
-limit is ``TOO_FAST_RPM`` RPM above the set-point. If the board repeats a speed that is above both
-limits, this speed is outdated, and the wheel is at rest."""
+"""A repeated speed is outdated, and the wheel is at rest, if the speed is more than ``TOO_FAST``
+times the set-point, and more than ``TOO_FAST_RPM`` RPM above it."""
 UNLIKE: Final = 1.15
-"""The *factor* of a wheel is its speed divided by its set-point. If both wheels roll backward, both
-factors may be high, but they are similar. ``UNLIKE`` is the largest ratio between them that is
-regarded as similar."""
+"""Largest usual quotient of the two wheels' ratios of speed to set-point, while both wheels roll
+backward."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
-"""``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion after which a
-wheel that is commanded forward or backward is regarded as stalled. The numbers prevent a false
-alarm on a bad line, where few reports arrive. The number for backward is larger: such a stall may
-show only as an unchanged speed, which a wheel that rolls steadily can also report a few times."""
+"""``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion that show a stall,
+after a forward or backward command. A wheel that rolls steadily backward can repeat its speed a few
+times."""
 
 
 class StallWatch:
@@ -48,8 +45,8 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. It may
-    roll if the speed that the board repeats is higher than usual for a wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll in spite of the stall, because the repeated
+    speed is too high for a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -58,9 +55,8 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.may_roll = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of reports without motion; a report counts only if it could have
-        shown a motion. The number is set to zero when the wheel turns, when a command starts or
-        reverses it, and when ``stalled`` returns any wheel as stalled."""
+        """For each wheel: number of reports that could have shown a motion, but did not. Motion, a
+        new or reversed command, or a stall of any wheel sets it to zero."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
@@ -87,8 +83,7 @@ class StallWatch:
     ) -> None:
         """Process a report: ticks, or the board's odometry.
 
-        The ticks show whether a wheel turns that is commanded forward. The board's odometry shows
-        whether a wheel turns that is commanded backward.
+        The ticks show forward motion; the board's odometry shows backward motion.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """
@@ -114,9 +109,8 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
-        At least ``AT_LEAST`` reports must show that the wheel does not turn. For a wheel that is
-        commanded backward, at least ``AT_LEAST_BACKWARD`` reports must show it. If a wheel is
-        returned as stalled, the times and the reports of both wheels are counted from zero again.
+        At least ``AT_LEAST`` (forward) or ``AT_LEAST_BACKWARD`` reports are needed. A stall
+        restarts the count for both wheels.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)
@@ -132,8 +126,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        An unchanged speed is regarded as old in two cases: the speed of the other wheel has
-        changed, or the speed of ``wheel`` is far above its set-point.
+        The speed is unchanged, and either the other wheel's speed has changed, or ``wheel`` would
+        be too fast for its set-point.
         """
         if told is None or self._told is None:
             return False

@@ -2,10 +2,8 @@
 
 """Changes of the terminal mode, and the stop of the robot before this and other changes.
 
-In a terminal mode, the board passes on the lines of a sensor. It then reports neither motion nor
-its e-stop button.
-
-This module knows modes and times; it does not know how commands are sent.
+In a terminal mode, the board reports neither motion nor its e-stop button. This module knows modes
+and times, but not how commands are sent.
 """
 
 import math
@@ -25,9 +23,8 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    It stops the robot before a sensor's mode begins. Some parameters also change only at rest:
-    ``stop_first`` makes it stop the robot before such a change. ``want`` and ``stop_first`` may be
-    called at any time.
+    The robot is stopped before a sensor's mode, and before each change that is passed to
+    ``stop_first``. ``want`` and ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:
@@ -65,8 +62,7 @@ class ModeChange:
     def stop_first(self, parameter: str, value: str) -> None:
         """Stop the robot, because ``parameter`` gets a new ``value``.
 
-        Motion is refused until the robot is seen at rest. If it is not seen at rest, motion is
-        refused for about ``UNPROVED_S``.
+        Motion is refused until the robot is seen at rest, or for about ``UNPROVED_S``.
         """
         self._stopping[parameter], self._stopping_since_s = value, None
 
@@ -114,9 +110,8 @@ class ModeChange:
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
         """Return the command to send now to stop the robot before a change, or None.
 
-        The command is Stop until the robot is at rest, but at most for ``UNPROVED_S``. Then it is
-        RPM 0/0, which clears the board's RPM target. While this target is positive, the public
-        firmware counts backward motion by duty as forward motion.
+        * First: Stop, until the robot is at rest, but at most for ``UNPROVED_S``.
+        * Then: RPM 0/0, until ``cleared``. With a positive target, backward ticks count as forward.
 
         ``stands``: whether the robot is seen at rest.
 

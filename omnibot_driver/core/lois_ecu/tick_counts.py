@@ -2,8 +2,8 @@
 
 """The tick counts of a LOIS ECU: the last ones, and whether new ones show a restart of the board.
 
-A restarted board counts from zero, and its clock begins at zero. But wheels also roll back, and a
-clock in ns also begins at zero every 4.3 s. This module does not know other reports.
+Counts and clock near zero are not a proof: wheels roll back, and a clock in ns wraps every 4.3 s.
+This module does not know other reports.
 """
 
 import math
@@ -24,34 +24,28 @@ from omnibot_driver.core.lois_ecu.plausibility import (
 RESTARTED_TURNS: Final = 0.3
 RESTARTED_TICKS: Final = 2
 RESTARTED_TURNS_PER_S: Final = 1.0
-"""The largest plausible decrease of a wheel's count from one tick report to the next.
+"""Largest plausible decrease of a wheel's count in ``duration`` s without a restart of the board.
 
-In ``duration`` seconds, a wheel can roll back by ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S *
-duration`` turns, plus ``RESTARTED_TICKS`` ticks. If a count decreases by more than this, the board
-has restarted.
+The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, plus
+``RESTARTED_TICKS`` ticks.
 """
 SILENT_S: Final = 1.0
-"""Limit, in s, for the time without tick reports, used to detect a restart of the board.
+"""Time in s without tick reports after which the clock alone shows a restart.
 
-If the counts are near zero and the clock is irregular, either the board has restarted, or the
-wheels have rolled back. If the time without tick reports is above the limit, the driver assumes a
-restart.
+Earlier, the wheels may also have rolled back.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Limit, in s, for the time since the last tick report, if the board's clock does not confirm it.
+"""Longest assumed time in s since the last tick report, after the unit of the board's clock has
+become unknown.
 
-To detect a restart, the driver computes how far the wheels may have rolled back since the last tick
-report. If the unit of the board's clock has just become unknown, the driver computes with at most
-this limit.
+The time limits how far the wheels may have rolled back.
 """
 IN_FLIGHT_S: Final = 0.5
-"""Time in s, from the first counts after a reset, in which counts may still be from before the
-reset.
+"""Time in s, from the first counts after a reset, in which counts may be from before the reset.
 
-There are two causes for such counts. The board may have sent them before it received the reset.
-Or the driver may have read them late.
+They were sent before the board received the reset, or were read late.
 """
 
 
@@ -100,7 +94,7 @@ class TickCounts:
     def was_reset(self, ticks: Ticks, read_s: float) -> bool:
         """Return whether the board may have obeyed a reset since the last report of ticks.
 
-        This is so if a reset was sent, and a count is nearer to zero than in the last report.
+        A reset was sent, and a count is nearer to zero than before.
 
         ``read_s``: time of the read in s, without a correction for a late read.
         """
@@ -162,9 +156,7 @@ class TickCounts:
         The result is False in two cases:
 
         * The counts are larger than a wheel can roll in ``duration_s``.
-        * The expected motion explains the counts: in duty mode, wheels may roll back faster than
-          ``RESTARTED_TURNS_PER_S``. This is checked only while the reports show a clock in ns and
-          counts of both wheels.
+        * The clock counts ns, both wheels are counted, and the expected motion explains the counts.
 
         ``fallen``: the larger decrease of a count.
         """
@@ -178,16 +170,14 @@ class TickCounts:
         return self._odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start; None if it is unknown.
+        """Return the time in s since the board's start, which followed the previous report.
 
-        The caller assumes that the board has started after the previous report. The clock begins at
-        zero at the start, so its value is the result.
+        None in two cases:
 
-        The result is None if the unit of the clock is unknown. A clock in ns also begins at zero
-        every 4.3 s, so its value is used only if the previous report is less than 4.3 s old, and
-        the value is not larger than the age of this report.
+        * The unit of the clock is unknown.
+        * A clock in ns may have wrapped (every 4.3 s), or shows a start before the previous report.
 
-        ``ticks``: the new report. ``duration_s``: time in s since the previous report.
+        ``duration_s``: time in s since the previous report.
         """
         if self.unit is None:
             return None
@@ -199,13 +189,10 @@ class TickCounts:
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
         """Return whether the clock and the counts prove a restart of the board.
 
-        This method is called if the counts and the clock may have begun at zero again. A small
-        clock value alone proves nothing, because a clock in ns begins at zero every 4.3 s.
+        The clock must be irregular, and rolling wheels must not explain the counts. After more than
+        ``SILENT_S`` without ticks, the clock alone is enough.
 
-        A restart is proved if the clock does not fit the earlier reports, and rolling wheels do not
-        explain the counts. If no ticks came for more than ``SILENT_S``, the clock alone proves it.
-        Without a proof, the uncertainty of the odometry is increased, because a restart is still
-        possible.
+        Without a proof, increase the uncertainty of the odometry.
         """
         odometry, silent = self._odometry, duration_s > SILENT_S
         deviation_s, certain = self.time.deviation_s(ticks.time_counts, self.unit, now)

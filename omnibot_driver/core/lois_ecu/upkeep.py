@@ -2,8 +2,7 @@
 
 """Schedule of all that is written to a LOIS ECU except set-points, resets and the ball command.
 
-(The ball command makes a device on the robot drop a ball.) This module combines the classes for
-settings, modes, records and recovery. It does not know the reports of the board.
+The ball command drops a ball from the robot. This module does not know the board's reports.
 """
 
 import math
@@ -40,9 +39,10 @@ class Upkeep:
     def configure(self, settings: LoisEcuSettings) -> None:
         """Use new settings. Changed settings are written to the board.
 
-        The robot is first stopped if the drive mode changes, or if a sensor's terminal mode is
-        requested. In duty mode, it is also stopped if the duty scale changes, or if ``max_duty``
-        becomes lower.
+        The robot is stopped before some changes:
+
+        * drive mode, or a request of a sensor's terminal mode.
+        * in duty mode: duty scale, or a lower ``max_duty``.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
@@ -94,8 +94,7 @@ class Upkeep:
     def _change_mode(self, now: float, *, stands: bool) -> bytes:
         """Return the bytes to write now to change a mode, or no bytes if nothing is due.
 
-        The robot must be at rest before some changes. For these changes, the first calls return
-        zero set-points. Later calls return the lines that set the terminal mode.
+        If the change needs a robot at rest, the first calls return zero set-points.
         """
         change, with_sum = self.change, self.writer.settings.with_sum
         if stop := change.stops(now, stands=stands, cleared=self._points.cleared):

@@ -41,9 +41,8 @@ class WheelModel:
 
     ``kind``, ``target_mps``: the command that the motor follows now.
 
-    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. The firmware keeps it in duty
-    mode, although the motor does not follow it, and counts ticks only while it is positive. A
-    negative duty lowers it with each tick.
+    ``hidden_mps``: the firmware's RPM target, as a speed of the rim; kept in duty mode. The
+    firmware counts ticks only while it is positive. A negative duty lowers it with each tick.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -79,7 +78,7 @@ class WheelModel:
     def unmeasured(self) -> bool:
         """Whether a duty is set, and the public firmware does not measure this wheel's speed.
 
-        A stop is a duty too: the wheel rolls out, and the firmware does not measure that either.
+        A stop is a duty too: the speed of a wheel that rolls out is not measured.
         """
         return self.kind == "duty" and not self.measured_sign
 

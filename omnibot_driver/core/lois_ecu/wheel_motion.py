@@ -17,17 +17,13 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
 tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""Indices of the body's states.
+"""Indices of the body's states. Those of a wheel are for the left wheel; add 1 for the right wheel.
 
-``X``, ``Y``: position in m.
-
-``TURN``: how much farther the right wheel has rolled than the left one, in m. ``ALONG``: mean
-distance of both wheels, in m. The filter predicts the board's odometry (0x20) from ``TURN`` and
-``ALONG``.
-
-``BIAS``: error of a wheel's speed. ``EXCESS``: a wheel that rolls backward is faster than its
-set-point by this fraction of the set-point. Both are states of each wheel: the index is that of the
-left wheel's state, and the right wheel's state follows it.
+* ``X``, ``Y``: position in m.
+* ``TURN``: distance of the right wheel minus that of the left wheel, in m.
+* ``ALONG``: mean distance of both wheels, in m.
+* ``BIAS``: error of a wheel's speed: relative in duty mode, otherwise in m/s.
+* ``EXCESS``: fraction of the set-point by which a wheel that rolls backward is too fast.
 """
 STATES: Final = 18
 
@@ -49,11 +45,11 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Factor in s for the uncertainty of a wheel's distance after an early halt.
+"""Factor in s for the error of a wheel's distance after an early halt, before the wheel has reached
+the assumed speed.
 
-A halt is early if it comes so soon after a new set-point that the wheel has not reached the speed
-that the filter assumed. The standard deviation of the distance in m is this factor, multiplied by
-``unsettled_mps``. First value: for the board's own gains. Second value: for the user's gains.
+The standard deviation in m is this factor times ``unsettled_mps``. First value: for the board's own
+gains. Second value: for the user's gains.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -66,16 +62,13 @@ Terms = list[tuple[int, float]]
 class Step:
     """One step of the filter over ``dt`` s.
 
-    ``new``: means of the states after the step.
-
-    ``unsure_mps``: for each wheel, the standard deviation of its last measured speed. The key is
-    the index of the wheel's first state.
-
-    ``rows``: the rows of the transition matrix that differ from the identity matrix. The key is the
-    index of the state.
-
-    ``noises``: independent errors of the step. An error has two values: a list of the states that
-    it changes, each with its factor, and a variance.
+    * ``new``: means of the states after the step.
+    * ``unsure_mps``: standard deviation of the last measured speed of a wheel, by the index of the
+      wheel's first state.
+    * ``rows``: the rows of the transition matrix that differ from the identity matrix, by the index
+      of the state.
+    * ``noises``: independent errors of the step. Each has a list of the states that it changes,
+      with their factors, and a variance.
     """
 
     dt: float
@@ -91,7 +84,7 @@ class Wheel:
     ``base``: index of the wheel's first state in the filter.
 
     ``blind``: whether the wheel moved, or had a target other than zero, while the board did not
-    count its ticks. The attribute remains True until the caller sets it to False.
+    count its ticks. Only the caller sets it to False.
     """
 
     def __init__(self, base: int) -> None:
@@ -100,10 +93,9 @@ class Wheel:
         self.rolled_to_m = 0.0
         """Distance in m that the wheel had rolled when its motion was last certain.
 
-        The motion is certain when a new measured speed arrives, when the board restarts, when the
-        controller is reset, and when a command starts a wheel whose target was zero. If the wheel
-        proves to have been at rest since then, the driver subtracts the distance that it has added
-        meanwhile.
+        That is at a new measured speed, a restart, a reset of the controller, and the start of the
+        wheel. If the wheel has rested since then, the driver subtracts the distance that it has
+        added.
         """
         self.begin_again()
 
@@ -125,11 +117,8 @@ class Wheel:
         The wheel gets power again when the integral ``wound_m`` is large enough.
         """
         self.rolls_on = False
-        """Whether the driver ignores the speed that the board reports.
-
-        The driver ignores this speed after a reset of the controller, as long as the board may have
-        measured it before the reset.
-        """
+        """Whether the reported speed may still belong to the motion before the last reset of the
+        controller."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
@@ -138,11 +127,8 @@ class Wheel:
         ``rolled_mps``: speed of the wheel at this reset, in m/s.
         """
         self.locked = False
-        """Whether the wheel is at rest, and gets no power because of an old measured speed.
-
-        The controller still uses the last measured speed. This speed exceeds the target, so the
-        controller gives no power.
-        """
+        """Whether the wheel is at rest, and gets no power, because its last measured speed exceeds
+        the target."""
         self.rests = False
         """Whether the driver has concluded that the wheel is at rest.
 
@@ -172,8 +158,8 @@ class Wheel:
     def counts(self, speed_mps: float, *, signed: bool) -> float:
         """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
-        The factor is -1 if the wheel rolls backward, but the count still increases. It is 0 while
-        the board does not count.
+        * -1: the wheel rolls backward, but the count increases.
+        * 0: the board does not count.
 
         ``signed``: whether the count decreases when the wheel turns backward.
         """
