@@ -2,8 +2,8 @@
 
 """How the driver corrects the motors' units during a drive, and what it learns from the result.
 
-This module knows the current motion and its measured speed; it does not know how a motion begins or
-ends. The caller passes the time.
+This module knows the current motion and its measured speed; it does not know how motions begin or
+end.
 """
 
 import math
@@ -19,10 +19,7 @@ from omnibot_driver.core.readings import DisplacementReading
 WAG_S, WAG_UNITS = 0.2, 2
 """A small turn that tests the IMU in a drive in which the reported heading is constant.
 
-A working IMU reports the turn. Without the turn, a straight drive and a dead IMU would look the
-same.
-
-``WAG_S``: time in s for which the heading is constant before the driver makes this turn.
+``WAG_S``: time in s for which the heading is constant before this turn.
 
 ``WAG_UNITS``: motor units added to the left motor, and subtracted from the right one.
 """
@@ -30,8 +27,7 @@ same.
 SUPERVISED_S: Final = 1.0
 """Time in s without an answered change of the units, after which the driver sends ``CS 0 0`` in B.
 
-This request changes nothing. Its answer shows whether the server still supervises the motion: after
-a restart, the motors keep running, and no other reply in B shows that.
+The answer shows that the server still supervises the motion: after a restart, the motors run on.
 """
 STARTED_M: Final = 0.01
 """Distance in m after which it is certain that the current units are enough to turn the motors."""
@@ -83,11 +79,10 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Set the ratio of wheel speeds (left / right) that the odometry expects.
+        """Set the ratio of wheel speeds (left / right) that gives the robot's turn.
 
-        The odometry computes the robot's turn from this ratio in two cases: in a turn on the spot,
-        and in a backward drive (B) whose heading the server does not report. In all other cases,
-        the ratio is None.
+        * Turn on the spot, and backward drive (B) without reported headings: the expected ratio.
+        * All other motions: None.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
@@ -103,8 +98,7 @@ class Adjusting(Moves):
     def _doubt_the_left_wheel(self, seconds: float) -> None:
         """Add uncertainty to the odometry, because the left wheel may have turned for ``seconds``.
 
-        The driver cannot see such a turn: the left wheel has no encoder, and the right wheel may be
-        stuck.
+        The left wheel has no encoder, and the right wheel may be stuck.
         """
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
@@ -114,8 +108,7 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Record that the present motor units are too small to turn the motors.
 
-        If the robot has already moved in this motion, the units were sufficient, and an obstacle
-        blocks the robot. Then nothing is recorded.
+        Do nothing if the robot has already moved in this motion: then an obstacle blocks the robot.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.turn.spun_rad) * self._settings.track_m / 2

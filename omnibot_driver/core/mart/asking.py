@@ -2,10 +2,9 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-The stop port is the server's second UDP port. After its use, a stop command on the first port (SM
-or SRM) may hang the server (docs/internals/mart_protocol.md). So the driver sends queries first.
-This module knows commands and replies; it does not know why the stop port was used. The caller
-passes the time.
+After a use of this second UDP port, SM or SRM on the first port may hang the server
+(docs/internals/mart_protocol.md). This module knows commands and replies; it does not know why the
+stop port was used. The caller passes the time.
 """
 
 import math
@@ -24,8 +23,7 @@ from omnibot_driver.core.packets import Packets
 STOP_AGAIN_S: Final = 3.0
 """Interval in s at which the driver repeats the stop commands SL and SS to a silent server.
 
-A server that executes a controlled move is silent too. SL and SS end this move, and the server
-answers again.
+SL and SS end a controlled move, during which the server is silent.
 """
 APART_S: Final = 0.4
 """Least time in s between two encoder counts that are compared to see whether the robot moves."""

@@ -85,8 +85,7 @@ class MartBoard(Board):
         """The mode of the board.
 
         The mode becomes nominal when the server has answered the first stop of the connection. It
-        stays unknown in two cases: the server is lost, or the reply to HELLO has shown that the
-        server is not a motion controller.
+        stays unknown while the server is lost, or is not a motion controller.
         """
         return self._mode
 
@@ -161,8 +160,8 @@ class MartBoard(Board):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that are due even if no datagram arrives.
 
-        Examples are odometry, and the result of a job. While the driver expects the server to be
-        silent, a reading NOTHING_MEASURED is due every 0.2 s (``EXPECTED_EVERY_S``).
+        Examples are odometry, and the result of a job. While the server is expected to be silent,
+        NOTHING_MEASURED is due every ``EXPECTED_EVERY_S``.
         """
         readings = self._pilot.take()
         pilot = self._pilot
@@ -239,8 +238,8 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server's heading is exactly zero, as before its first RM (forward drive).
 
-        The server's clock may be set back only before the first RM. RM integrates the turn rate
-        over the time since the previous RM, so it would report a wrong heading after such a change.
+        Later, the server's clock must not be set back: RM integrates the turn rate since the
+        previous RM.
         """
         return self._pilot.odometry.heading.is_zero
 
@@ -267,10 +266,10 @@ class Conductor:
         return self._pilot.wake_at
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the driver regards the order as a standstill, because it is so slow.
+        """Return whether the order is so slow that the driver regards it as a standstill.
 
-        The driver never regards a goal (GoTo) as a standstill. Raises CommandRefused if the goal is
-        more than FARTHEST_M (m) away from the robot.
+        A goal (GoTo) is never a standstill. Raises CommandRefused if the goal is more than
+        FARTHEST_M (m) away from the robot.
         """
         if isinstance(order, GoTo):
             way_m = self._pilot.odometry.pose.way_to(order.place).way_m

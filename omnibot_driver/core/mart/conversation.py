@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The exchange with the server: send one request, and find the reply to it.
+"""The exchange with the server: send one request, and find the reply to it by its form and time.
 
-Replies carry no sequence number. So the driver finds the reply to a request by its form and its
-time. This module knows requests and replies; it does not know what the requests are for. The caller
+This module knows requests and replies; it does not know what the requests are for. The caller
 passes the time.
 """
 
@@ -31,42 +30,37 @@ from omnibot_driver.core.packets import Packets
 QUICKEST_S: Final = 0.1
 """Shortest wait in s for the reply to a query, or to a command that changes a motion.
 
-The time that the server needs to execute the command is added to this wait.
+The server's time to execute the command is added.
 """
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
 """Increase of ``trip_s``, the average duration of a query, after an unanswered query.
 
-The new value is ``LOSS * trip_s + LOSS_S`` (s), at most ``delay_s``. The driver then waits longer
-for the next reply, because the missing reply may only be late.
+The new value is ``LOSS * trip_s + LOSS_S`` (s), at most ``delay_s``.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """Times in s that determine whether the network is regarded as disturbed.
 
-In a disturbed network, a reply may answer an earlier query instead of the last one.
+``SLOW_S``: a longer urgent query (PRESSING) is a sign of a disturbance.
 
-``SLOW_S``: an urgent query (PRESSING) whose reply takes longer is a sign of a disturbance.
-
-``DISTURBED_S``: the network is regarded as disturbed for this time after the last sign.
+``DISTURBED_S``: for this time after a sign, a reply may answer an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Urgent queries. The driver sends them even if a late reply to an earlier query may still come.
 
-The late reply could then be mistaken for the reply to the urgent query. Therefore, the driver marks
-the answer to the urgent query as doubtful.
+Their answers are then marked as doubtful.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
-"""Kinds of commands whose replies are easily confused, because most of them are only a number.
+"""Kinds of commands whose replies are mostly only a number.
 
-The network may deliver a copy of such a reply. The copy can be mistaken for the reply to a query.
+A copy of such a reply can be mistaken for the reply to a query.
 """
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
-All other replies to a check take time. So any other reply that comes early belongs to another
-request.
+Any other early reply belongs to another request, because a check takes time.
 """
 
 
@@ -110,13 +104,10 @@ class Answer:
 class Conversation:
     """The exchange of requests and replies with one server.
 
-    ``delay_s``: longest time that a datagram may be on its way, in s.
-
-    ``trip_s``: average duration of a query, in s; each unanswered query increases it.
-
-    ``answered_trip_s``: average duration of answered queries, in s.
-
-    ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply.
+    * ``delay_s``: longest time that a datagram may be on its way, in s.
+    * ``trip_s``: average duration of a query, in s; each unanswered query increases it.
+    * ``answered_trip_s``: average duration of answered queries, in s.
+    * ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -134,10 +125,9 @@ class Conversation:
         self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
-        """Return whether ``word`` may be sent now. It must wait while a request is pending.
+        """Return whether ``word`` may be sent now. Every command waits while a request is pending.
 
-        A query that is not in PRESSING, the urgent queries, also waits until no late reply can be
-        mistaken for its reply.
+        A query outside PRESSING also waits while a late reply could be mistaken for its reply.
         """
         if self.pending is not None:
             return False
@@ -158,8 +148,8 @@ class Conversation:
     def came(self, reply: Ok, now: float) -> None:
         """Record that ``reply`` is the late reply to an earlier request.
 
-        After that, no other late reply of the same form is expected. Nothing changes if ``reply``
-        is only a copy of a reply that has come before.
+        No other late reply of the same form is then expected. A copy of an earlier reply changes
+        nothing.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
@@ -213,8 +203,7 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply is recorded as missing, and may come late. Only the reply to a controlled move is
-        not recorded, because the stop of the move waits for it.
+        The reply may come late, and is recorded as missing, except the reply to a controlled move.
         """
         if self.pending is None:
             return None
@@ -280,8 +269,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        This is so if three conditions are true: ``word`` is a query, an equal reply to another
-        query or to a move has just come, and the last reply to ``word`` was different.
+        ``word`` is a query, its last reply was different, and an equal reply to another query or
+        move has just come.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

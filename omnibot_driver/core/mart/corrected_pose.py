@@ -2,8 +2,8 @@
 
 """The pose in the odometry frame, and how later knowledge of a motion corrects it.
 
-After a turn on the spot, the server reports the angle of the turn. This angle replaces the one that
-the wheel measured. This module knows angles and distances; it does not know counts or times.
+For example, the server reports the angle of a finished turn. This module knows angles and
+distances; it does not know counts or times.
 """
 
 import math
@@ -25,10 +25,7 @@ ANY_RAD: Final = 1.8
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
 """Standard deviations of the estimated first run of a controlled move that the robot made twice.
 
-If the network delivers a request twice, the robot makes the move twice, and only the second run is
-measured.
-``RUN``: the part of the error that grows with the estimate, as a fraction of the estimate.
-``END_RUN_M``, ``END_RUN_RAD``: the constant part of the error, in m and in rad.
+``RUN``: relative part of the error. ``END_RUN_M``, ``END_RUN_RAD``: constant part, in m and in rad.
 """
 
 
@@ -79,10 +76,7 @@ class CorrectedPose:
         return True
 
     def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add the first run of a controlled move to the pose, if the robot has made the move twice.
-
-        A duplicate of the request has started a second run, and only the second run was measured.
-        The first run is assumed to be complete.
+        """Add the unmeasured first run of a controlled move that the robot has made twice.
 
         ``amount``: the expected distance of a complete run in m, or its expected turn in rad.
         """
@@ -98,16 +92,14 @@ class CorrectedPose:
     def lose_turn(self) -> None:
         """Increase the uncertainty, because the robot may have turned by an unknown angle.
 
-        For example, the server restarts in a motion, and the motors keep their last command
-        meanwhile. The server's relative heading then begins at zero, so it does not show this turn.
+        For example, the server restarts in a motion, while the motors run on.
         """
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
     def doubt_turn(self, turn_rad: float) -> None:
         """Increase the uncertainty: an angle ``turn_rad`` may be missing in a measured turn.
 
-        One of the wheels may have stood still. The robot has then turned about this wheel, so that
-        its centre has moved too.
+        If one wheel stood still, the robot's centre has moved too.
         """
         turn_rad = min(abs(turn_rad), ANY_RAD)
         self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)
@@ -115,10 +107,9 @@ class CorrectedPose:
     def _end_turn(self, *, may_be_recorded: bool) -> float:
         """End a turn on the spot: correct the heading, and return the correction in rad.
 
-        If the server has reported a plausible angle, or none, the correction is zero. An
-        implausible angle belongs to another motion, or only one of the wheels has turned. The
-        driver cannot know which is true. So the angle from the encoder count is used instead, and
-        the difference between the two angles is added to the uncertainty.
+        * Plausible angle from the server, or none: no correction.
+        * Implausible angle: the encoder's angle replaces it, and the difference is added to the
+          uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

@@ -18,10 +18,9 @@ WAY_STDDEV: Final = 0.004
 The standard deviation grows with the square root of the distance.
 """
 GYRO_WALK: Final = 0.002
-"""Standard deviation in rad of the heading after 1 s of motion.
+"""Standard deviation in rad of the heading after 1 s of motion, which shakes the gyro.
 
-Motion shakes the gyro, and each shake adds an independent error to the heading (random walk). So
-the standard deviation grows with the square root of the time.
+The standard deviation grows with the square root of the time.
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that is measured only by the right wheel."""
@@ -40,23 +39,20 @@ TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 PIVOT: Final = 0.01
 """Standard deviation of the distance between the robot's centre and the point about which it turns.
 
-The value is a fraction of the track width. It applies to turns on the spot by 1 rad or more. For a
-smaller turn, the value is multiplied by the angle in rad.
+The value is a fraction of the track width; in turns below 1 rad, multiplied by the angle in rad.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""A turn that is computed from the commands has a constant and a random error.
+"""Ratio of random to constant error (standard deviations) of a turn computed from the commands.
 
-The constant error comes from the assumed wheel speed ratio. It has the same sign in all intervals
-between two encoder counts. The random error is independent in each interval. This value is the
-random error divided by the constant error, both as standard deviations.
+The constant error has the same sign in all intervals between two encoder counts.
 """
 ASTRAY: Final = 0.7
 """Factor for a position error that an uncertain heading causes.
 
-The error, as a fraction of the driven distance, is this factor times the variance of the heading
-(rad²), but at most 1. One such error is assumed along the motion, and another one across it.
+Along and across the motion, the error is this factor times the variance of the heading (rad²), at
+most 1, as a fraction of the driven distance.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
@@ -134,17 +130,14 @@ class Doubt:
     def begin(self) -> None:
         """Store the constant heading error at the beginning of a motion.
 
-        In the motion, turns that are computed from the commands may change this error. If the
-        server reports the heading during the motion, ``heading_told`` restores the stored value.
+        ``heading_told`` restores this error if the server reports the heading during the motion.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
         """Remove the constant heading error of this motion, because the server reports the heading.
 
-        The error comes from the time before this report, in which the turn was computed from the
-        commands. The random heading error stays in the covariance, and so does the position error
-        from the wrong heading.
+        The random heading error and the position error stay.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -177,15 +170,12 @@ class Doubt:
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
         """Replace the heading error of the last turn, because the server's record has arrived.
 
-        The old error is that of the angle that the wheel measured. The new error is that of the
-        recorded angle, which comes from the gyro. Call this before the position changes.
+        The gyro's error replaces that of the wheel. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
         """Return the heading and position errors that a turn on the spot has caused so far.
-
-        The robot does not turn exactly about its centre, so the position has an error too.
 
         ``spun_rad``: the turn that the right wheel measured. ``told_rad``: the turn that the server
         reported, or None.

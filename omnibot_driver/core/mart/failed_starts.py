@@ -16,9 +16,8 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""After this number of starts in a row that do not turn the right wheel, the driver gives up. Only
-starts of a backward drive (B) or a turn (R, L) are counted. The number is small, because each of
-these starts may turn the left wheel, and so move the robot."""
+"""Number of starts of a backward drive (B) or a turn (R, L) in a row, without a turning right
+wheel, after which the driver gives up. Each start may move the robot by the left wheel."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
@@ -32,8 +31,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: True if two conditions hold. The reply certainly answers this start command,
-        and the network is so good that a late copy of the command is unlikely.
+        ``arrived``: whether the reply certainly answers this start, and a late copy of it is
+        unlikely.
         """
         word = self._start
         assert word is not None
@@ -84,10 +83,8 @@ class FailedStarts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        For a reported reason other than an obstacle, the result is True. An obstacle may have ended
-        an earlier backward drive, or may be in front of the robot. The driver assumes that the
-        obstacle is in front, and the result is False, if the front sonar detects an obstacle too,
-        or if RM reports an obstacle again.
+        The result is False for an obstacle that the front sonar detects too, or that RM reports
+        again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -20,8 +20,7 @@ The measured value is divided by the requested or the expected one, whichever is
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
-The word SLOW in a request doubles the times per degree and inch. The times per degree and inch are
-those of a robot with the default settings; ``Done.slowness`` adapts them to another robot.
+SLOW doubles the times per degree and inch; ``Done.slowness`` adapts them to the robot.
 """
 LEAST_PACE: Final = 0.65
 """Slowest motion of one run of a move, as a fraction of the usual speed of this move."""
@@ -37,25 +36,16 @@ can show that the run was incomplete."""
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    The network may have duplicated the request. The duplicate starts a second run of the same move.
+    A duplicate of the request may have started a second run of the same move.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, they are
-    those of the second run alone.
-
-    ``lasted_s``: time in s from the request to the reply.
-
-    ``quiet_s``: longest possible duration of a second run, in s.
-
-    ``completed``: True if the server reported success, and no stop ended the move.
-
-    ``expected``: distance in m, or turn in rad, of a complete run. The driver has learned it from
-    earlier moves.
-
-    ``stopped_again``: whether the driver has sent a stop after the move, to end a possible second
-    run.
-
-    ``slowness``: usual time that the robot needs for a distance or turn, divided by the time that
-    a robot with the default settings needs.
+    * ``way_m``, ``turned_rad``: distance and turn by the encoder; of the second run alone, if any.
+    * ``lasted_s``: time in s from the request to the reply.
+    * ``quiet_s``: longest possible duration of a second run, in s.
+    * ``completed``: whether the server reported success, and no stop ended the move.
+    * ``expected``: distance in m, or turn in rad, of a complete run, learned from earlier moves.
+    * ``stopped_again``: whether the driver has sent a stop after the move, against a second run.
+    * ``slowness``: usual time for a distance or turn, relative to a robot with the default
+      settings.
     """
 
     request: Request
@@ -117,10 +107,9 @@ class Done:
 
     @property
     def contradicts_the_server(self) -> bool:
-        """Whether the encoder shows a wrong turn, but the server has reported a completed turn.
+        """Whether the server has reported a completed turn, but the encoder shows a wrong one.
 
-        In a wrong turn, the right wheel has turned much less or much more than required. The server
-        ends a turn by the gyro, so it may not notice a wheel that is stuck or slips.
+        The server ends a turn by the gyro, and may not notice a wheel that is stuck or slips.
         """
         if self.is_straight or not self.completed or not self.is_large:
             return False
@@ -138,8 +127,8 @@ class Done:
     def has_run_twice(self) -> bool:
         """Whether the measurements show that the server has run the move twice.
 
-        They show this if the server has completed the move, but the encoder count is too small for
-        it. Then the count is that of a second run, which the driver has stopped.
+        The server has completed the move, but the encoder shows only a second run, cut short by a
+        stop.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
@@ -148,8 +137,7 @@ class Done:
     def ended_late(self) -> bool:
         """Whether the reply came so late that the server may have run the move twice.
 
-        If the network duplicates the request, the server runs the move twice, and answers each run.
-        If the first answer is lost, the driver receives only the second one, which comes late.
+        The server answers each run, and the first answer may be lost.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -157,8 +145,7 @@ class Done:
     def lags(self) -> bool:
         """Whether a move that was cut short shows much less motion than its duration allows.
 
-        The network may have duplicated the request and lost the reply to the first run. The stop
-        has then cut the second run short, and the encoder shows only this run.
+        The encoder may show only the second run of a duplicated request.
         """
         driven_s = self.lasted_s - 2 * SETTLES_S
         least = LEAST_PACE * self.asked * driven_s / (self.usual_s - SETTLES_S)
@@ -168,7 +155,6 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply answers another request, and the driver took it for the answer to the move. A
-        stop that was sent after it, against a possible second run, has then ended the first run.
+        The reply belongs to another request, and a later stop has ended the move.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -2,8 +2,8 @@
 
 """The plan of moves to a goal pose: turn towards it, drive straight, turn to its heading.
 
-Moves are inexact, so each move is planned only after the previous one was measured. This module
-knows poses and commands for moves; it does not know when they are sent.
+Each move is planned after the previous one was measured. This module knows poses and commands for
+moves; it does not know when they are sent.
 """
 
 import math
@@ -23,34 +23,31 @@ NORMAL_UNITS: Final = 30
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 """After ``ENOUGH_MOVES`` moves, a distance of up to ``ENOUGH_M`` (in m) from the goal is accepted.
 
-Until then, the distance must be at most ``NEAR_M``, which is smaller. To come nearer than
-``ENOUGH_M``, the robot would need another turn and another straight move.
+Until then, the limit is ``NEAR_M``, which is smaller.
 """
 STRETCH: Final = 1.3
 """Assumed ratio of driven to requested length of a straight move, until one has been measured.
 
-For example, the robot drives 15.8 inches if 12 inches are requested, a ratio of 1.32.
+For example, the robot drives 15.8 inches instead of 12.
 """
 DOCK_STRETCH: Final = 1.6
 """Assumed largest ratio of driven to requested length of a docking move.
 
-The driver requests the allowed length divided by this ratio, so the robot does not drive too far.
-For example, a request for 19 inches (0.48 m) leads to a move of 0.73 m, a ratio of 1.5.
+The driver requests the allowed length divided by this ratio.
 """
 MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""Factor by which the allowed heading error increases with each turn since the last straight move.
+"""Growth of the allowed heading error with each turn since the last straight move.
 
-After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``. Without this
-increase, the robot might turn back and forth, because each turn may go too far.
+After ``turns`` turns, the allowed error is ``NEAR_RAD * (1 + WIDER * turns)``, so that the robot
+does not turn back and forth.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
 
-If a straight move takes too long, the driver stops it, and counts the moves from zero again
-(``Move.cut``).
+A straight move that takes too long sets the number to zero (``Move.cut``).
 """
 
 
@@ -85,8 +82,7 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the degrees to request, so that the robot turns by ``wanted`` degrees.
 
-        The result is 0 if the turn is not worthwhile: the heading error would become smaller by
-        WORTH_DEG or less.
+        The result is 0 if the heading error would become smaller by WORTH_DEG or less.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
@@ -95,9 +91,8 @@ class Surplus:
     def is_known(self, request: Request) -> bool:
         """Return whether the driver knows how far a complete move of this kind goes.
 
-        The angle of a turn is always known, because the server ends a turn by its gyro. The server
-        ends a straight move by time. So the distance of such a move is known only after one was
-        measured.
+        Turns are known, because the server ends them by its gyro. Straight moves must be measured
+        first.
         """
         return request.word in (MCR, MCL) or (b"SLOW" in request.data.split()) in self._learned
 
@@ -124,15 +119,10 @@ def docking_inches(longest_m: float) -> int:
 class Move:
     """The progress towards the goal ``place``.
 
-    ``said``: number of sent moves that count towards the limit MOST_MOVES. ``cut`` sets it to 0.
-
-    ``turns``: number of turns since the last straight move.
-
-    ``given_up``: whether the driver sends no further move, because the robot has arrived or the
-    goal has failed.
-
-    ``failed``: whether the goal has failed: a move has failed, or MOST_MOVES moves did not reach
-    the goal.
+    * ``said``: number of sent moves that count towards the limit MOST_MOVES.
+    * ``turns``: number of turns since the last straight move.
+    * ``given_up``: whether no further move is sent: the robot has arrived, or the goal has failed.
+    * ``failed``: whether a move has failed, or MOST_MOVES moves did not reach the goal.
     """
 
     place: Pose
@@ -148,9 +138,9 @@ class Move:
     def repeated(self) -> "Move":
         """Return the ``Move`` to continue with when the goal ``place`` is commanded again.
 
-        If the goal is in progress, it continues. If the goal has failed, it begins anew. If the
-        robot has reached the goal, it makes another straight move only if it is now more than
-        ENOUGH_M (m) away from the goal.
+        * The goal is in progress: it continues.
+        * The goal has failed: it begins anew.
+        * The goal was reached: another straight move only if it is now more than ENOUGH_M (m) away.
         """
         if not self.given_up:
             return self
@@ -161,8 +151,7 @@ class Move:
     def cut(self) -> None:
         """Count moves and turns from 0 again, because a straight move took too long.
 
-        The driver has stopped this move, but the goal has not failed: the robot needs several
-        straight moves to reach a goal that is far away.
+        The driver has stopped this move, but a goal that is far away needs several.
         """
         self.said = self.turns = 0
 

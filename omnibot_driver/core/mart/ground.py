@@ -42,8 +42,8 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 STARTS_UP_S: Final = 1.5
 """Shortest time in s from the server's first reply after an absence to the start of a motion.
 
-The server may just have been started. While it starts up, VOLTS and most motion commands crash it.
-If RM (forward drive) crashes it, the motors stay on after the crash.
+VOLTS and most motion commands crash a server that starts up. If RM (forward drive) crashes the
+server, the motors stay on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Time without a reply after which the driver regards the server as absent.
@@ -66,10 +66,10 @@ The time is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a que
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
 """Limits in s for a short silence of a server at rest, in which it may have been restarted.
 
-``GAP_S``: shortest such silence. Twice the average duration of a query is added to it.
+``GAP_S``: shortest such silence; twice the average duration of a query is added.
 
-``GAP_LONGEST_S``: longest time after such a silence for which a motion waits for a heading. A
-heading of exactly zero shows a restart.
+``GAP_LONGEST_S``: longest wait for a heading after such a silence. A heading of zero shows a
+restart.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
@@ -82,27 +82,23 @@ a server whose stop port hangs."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
-A server that executes the move does not answer HELLO. So an answer shows that the move is over and
-its reply is late or lost, or that the server was restarted.
+The server answers HELLO only after the move, or after a restart.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
 
-While the robot is at rest, the server answers ``fail`` and does nothing, so a stop is harmless.
+At rest, a stop is harmless: the server only answers ``fail``.
 """
 
 
 class Ground:
     """The state that all parts of the pilot share.
 
-    ``readings``: readings that the caller has not taken yet.
-
-    ``heard_s``: time of the server's last reply. ``appeared_s``: time of the server's first reply
-    after an absence.
-
-    ``greeted``: whether the server has answered the first stop of this connection.
-
-    ``settings``: the sizes and scales of the robot; may be replaced.
+    * ``readings``: readings that the caller has not taken yet.
+    * ``heard_s``: time of the server's last reply.
+    * ``appeared_s``: time of the server's first reply after an absence.
+    * ``greeted``: whether the server has answered the first stop of this connection.
+    * ``settings``: the sizes and scales of the robot; may be replaced.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -195,8 +191,7 @@ class Ground:
     def blind_since_s(self) -> float | None:
         """Start time of a controlled move that is in progress, or that the server may run again.
 
-        None if there is no such move. During a controlled move, the server reports no measurements,
-        so the driver is blind.
+        None if there is no such move. The server reports no measurements during the move.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
@@ -225,7 +220,7 @@ class Ground:
     def _seems_present(self) -> bool:
         """Whether replies show that the server was not restarted since the last start command.
 
-        They show this if no silence between two successive replies was long enough for a restart.
+        Since then, no silence between two replies was long enough for a restart.
         """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
@@ -233,8 +228,7 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply. Decide whether the server may have been restarted.
 
-        There are two signs of a restart: a long silence before this reply, or previous replies from
-        another kind of server.
+        Signs are a long silence, or earlier replies from another kind of server.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
@@ -307,11 +301,11 @@ class Ground:
     def _waits_for_heading(self) -> bool:
         """Return whether the driver must wait for a heading before it reads the encoder.
 
-        This is necessary only after a forward drive (RM). The first encoder count at rest ends this
-        drive in the odometry, and the odometry then needs a heading that was measured at rest.
+        After a forward drive (RM), the odometry needs a heading at rest before the first encoder
+        count.
 
-        The wait lasts at most HEADING_S (s), plus HEADING_TRIPS times the duration of a query. If
-        no heading has come by then, the driver logs NO_HEADING once.
+        The wait lasts at most HEADING_S (s), plus HEADING_TRIPS times the duration of a query. Then
+        the driver logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

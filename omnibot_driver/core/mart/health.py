@@ -49,26 +49,20 @@ It is uncertain if the reply may answer another query.
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s after a failed RM (forward drive) in which RM can still move the robot.
-
-If the robot moves without a command in this time, the driver concludes that RM is the cause.
-"""
+"""Time in s after a failed RM (forward drive) in which RM is the assumed cause of a motion without
+a command."""
 
 
 class Health:
     """The health of robot and server.
 
-    ``stranger``: name of a server that is not a motion controller, else empty.
-
-    ``heading_told``: kinds of motion, besides RM (forward drive), in which the server reports the
-    heading.
-
-    ``heading_changes``: number of changes of the reported heading in the current motion.
-
-    ``reference_fails``: number of starts of RM in a row that have failed.
-
-    ``outlived``: whether the server answered a stop only after the driver had used the stop port.
-    If so, the stop of the next motion can fail.
+    * ``stranger``: name of a server that is not a motion controller, else empty.
+    * ``heading_told``: kinds of motion, besides RM (forward drive), in which the server reports the
+      heading.
+    * ``heading_changes``: number of changes of the reported heading in the current motion.
+    * ``reference_fails``: number of starts of RM in a row that have failed.
+    * ``outlived``: whether the server answered a stop only after the use of the stop port, so that
+      the stop of the next motion can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -130,7 +124,7 @@ class Health:
     def _is_of_another(self, word: Word, inches: float) -> bool:
         """Return whether the distance is probably the reply to another query.
 
-        It probably is if it is 0 inches, or if it equals the last reading of the other sonar.
+        The distance is then 0 inches, or equals the last reading of the other sonar.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
@@ -142,8 +136,8 @@ class Health:
     def _status(self, bits: int) -> None:
         """Record the status of the motor board.
 
-        The late reply to a query of the encoder count can look like a status. So a status other
-        than 0 is believed only if it comes twice in a row.
+        A status other than 0 must come twice in a row, because a late encoder count can look like a
+        status.
         """
         if not 0 <= bits <= NO_READ:
             return
@@ -154,8 +148,7 @@ class Health:
     def outlives(self) -> None:
         """Record that the server answered a stop late, after the driver had used the stop port.
 
-        The stop port may still wait for the end of the motion that it should stop. It may then hang
-        during the next motion.
+        The stop port may still wait, and may hang during the next motion.
         """
         self.outlived, self._may_be_restarted = True, False
 
@@ -170,8 +163,7 @@ class Health:
     def rests(self, heading_rad: float) -> None:
         """Find out from the heading of a robot at rest whether the server was restarted.
 
-        A restarted server reports a heading near zero. A heading that has only changed does not
-        prove a restart: the gyro drifts, and a user may turn the robot.
+        Only a heading near zero shows a restart; drift or a user can change the heading too.
         """
         if not self.outlived or not abs(heading_rad) < MOST_RAD:
             return
@@ -194,8 +186,7 @@ class Health:
     def heading_changed(self, motion: Motion) -> None:
         """Record that the reported heading has changed during a motion of the kind ``motion``.
 
-        After HEADING_CHANGES changes, the driver assumes that the server reports the heading in all
-        motions of this kind.
+        After HEADING_CHANGES changes, the driver expects headings in all motions of this kind.
         """
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
@@ -216,8 +207,7 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        The server may have reported shortly before that RM (forward drive) failed. If so, RM has
-        started the motors in spite of this report, and the server is regarded as defective.
+        Shortly after a failed RM (forward drive), the server is regarded as defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

@@ -2,8 +2,7 @@
 
 """What the pilot does when a reply comes, and when a reply does not come in time.
 
-The pilot is the part of the driver that sends requests to the server. This module knows the pilot's
-states and the replies; it does not know the next request. The caller passes the time.
+This module knows the pilot's states and the replies; it does not know the next request.
 """
 
 import math
@@ -22,10 +21,7 @@ from omnibot_driver.core.mart.words import Form, Kind, Word
 BLIND_PART: Final = 0.15
 """Largest relative change of the motors' units after which a missing reply does not stop the robot.
 
-This applies to a backward drive (B) in which the server reports no headings. The driver then
-computes the robot's turn from the motors' units. If a change is not answered, the driver does not
-know which units apply. The turn is still known well enough after a small change, but not after a
-larger one.
+The limit applies if the robot's turn is computed from the units: backward (B), without headings.
 """
 
 
@@ -74,8 +70,7 @@ class Hearing(Measuring):
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply that comes after a stop command may belong to an earlier request.
 
-        For example, it may be the ``ok`` to the start of the motion, or an encoder count. It may
-        also be a copy of such a reply.
+        Examples are the ``ok`` to the start, an encoder count, and copies of them.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -109,10 +104,9 @@ class Hearing(Measuring):
             self._ask_s = max(self._ask_s, now + self._delay_s)  # earlier replies may still come
 
     def _hurry(self, now: float) -> None:
-        """Shorten the wait for a missing reply, because the server has answered HELLO.
+        """Shorten the wait for a missing reply, because the server has answered a later HELLO.
 
-        This HELLO was sent later than the request whose reply is missing. The server answers in
-        order, so the missing reply is lost or about to come.
+        The server answers in order, so the missing reply is lost or about to come.
         """
         greeted_s = self._greeted_of_name(now)
         network = self.conversation
@@ -129,18 +123,16 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Estimate of how long a reply takes at the moment, in s from its request.
+        """Estimated time in s from a request to its reply at the moment.
 
-        It is the average duration of the answered queries, or the delay of the last check of the
-        IMU if that was longer.
+        The average of answered queries, or the delay of the last IMU check if it was longer.
         """
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 
     def _greeted_of_name(self, now: float) -> float:
         """Return the earliest time at which the HELLO that was just answered may have been sent.
 
-        The driver may have sent several HELLOs, and does not know which one was answered. The
-        result is minus infinity if the time is unknown.
+        Several HELLOs may be unanswered. Minus infinity if the time is unknown.
         """
         longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self._trip_s)
         recent = [each for each in self._greetings if each >= now - longest_s]
@@ -150,8 +142,7 @@ class Hearing(Measuring):
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion, because the server has answered HELLO during a move.
 
-        A server that executes a move does not answer HELLO. So the move is over and its reply was
-        lost, or the server was restarted.
+        The move is over and its reply was lost, or the server was restarted.
         """
         self._appears(now)
         self._moved_by = None

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The check that the IMU works, and the results of the last checks.
+"""The check that the IMU works (RST IMU, or MCR SLOW 0), and the results of the last checks.
 
-The driver checks the IMU with the command RST IMU, or with MCR SLOW 0. After a failed RST IMU, the
-server does not use the IMU until RST IMU succeeds, so the driver repeats the command. This module
-knows replies and times; it does not know which motion is started. The caller passes the time.
+After a failed RST IMU, the server uses the IMU only after a successful one. This module knows
+replies and times; it does not know which motion is started. The caller passes the time.
 """
 
 import math
@@ -26,8 +25,7 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, the driver assumes that the network has delayed it, and that half of the
-delay came after the check. So the result is already older by this half when it arrives.
+If a check takes longer, the result is assumed to be older by half of the excess when it arrives.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
@@ -77,12 +75,11 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check, and return whether this method could evaluate it.
+        """Evaluate the reply to a check; return False if the caller must evaluate it.
 
-        It evaluates a success and two failures: a dead IMU, and a server without RST IMU. The
-        caller must evaluate any other failure.
+        The caller evaluates all failures except a dead IMU, and a server without RST IMU.
 
-        ``took_s``: time from the check to the reply.
+        ``took_s``: time from the check to the reply, in s.
         """
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0

@@ -23,8 +23,7 @@ class IncomingFile:
     def add(self, data: bytes) -> bool:
         """Keep a datagram as a piece of the file, and return whether it may be one.
 
-        A datagram is ignored if it has neither the length of a full piece nor that of the last
-        piece.
+        The datagram must be as long as a full piece, or as the last piece.
         """
         fits = bool(data) and len(data) in (PIECE, self.size % PIECE)
         if fits:

@@ -19,18 +19,16 @@ from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.words import Form, Request, Word
 
 QUIET_S: Final = 1.0
-"""Time in s that the driver waits for a further piece of a file. After this time without a piece,
-it expects no more pieces.
+"""Time in s without a piece of a file after which the driver expects no more pieces.
 
-If it has received all bytes of the file, it waits for only a third of this time.
+A third of this time is enough after all bytes have arrived.
 """
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
-"""Times in s to wait for the record of a turn. The robot is at rest while the driver waits.
+"""Times in s to wait for the record of a turn, while the robot is at rest.
 
-``RECORD_S``: wait for the reply to the request. The duration of three average queries is added to
-this wait.
+``RECORD_S``: for the reply to the request; three average durations of a query are added.
 
-``RECORD_QUIET_S``: wait for each further piece of the file, after the first piece.
+``RECORD_QUIET_S``: for each further piece of the file.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a job in REPEATED."""
@@ -90,15 +88,12 @@ UNPROVED: Final = (
 class Jobs:
     """The job that is in progress, and the results of the jobs that have ended.
 
-    ``done``: results that the caller has not taken yet.
-
-    ``logging``: whether the server has acknowledged LOG in this connection, and so begun its log.
-
-    ``ended``: whether EXIT was sent, which ends the server.
-
-    ``moving``: whether the move of a docking job was sent.
-
-    ``turn_record``: name and pieces of the file of the last turn; None if it was not downloaded.
+    * ``done``: results that the caller has not taken yet.
+    * ``logging``: whether the server has acknowledged LOG, and so begun its log, in this
+      connection.
+    * ``ended``: whether EXIT was sent, which ends the server.
+    * ``moving``: whether the move of a docking job was sent.
+    * ``turn_record``: name and pieces of the file of the last turn; None if it was not downloaded.
     """
 
     def __init__(self) -> None:
@@ -148,8 +143,8 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job. It replaces a job that the driver itself began and has not sent yet.
 
-        Raises RequestRefused in two cases: another job is in progress, or the log is requested
-        although the server may have no log.
+        Raises RequestRefused if another job is in progress, or if the server may have no log to
+        download.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -258,8 +253,8 @@ class Jobs:
     def cancel(self, why: str) -> None:
         """End the job as failed. ``why``: the reason, and after a semicolon what to do.
 
-        A job that the driver has begun by itself gives no result. If the server has ended, the
-        advice in ``why`` is replaced, because the request cannot be repeated.
+        The driver's own jobs give no result. If the server has ended, the advice in ``why`` is
+        replaced.
         """
         if self.job in OWN:
             self._clear()

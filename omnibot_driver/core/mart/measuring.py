@@ -24,8 +24,8 @@ ROLLS_S, ROLLS_AFTER_MOVE_S, ROLLS_LONG_S = 0.3, 0.6, 1.2
 
 ``ROLLS_S``: after a stop.
 
-``ROLLS_AFTER_MOVE_S``: after a controlled move. The server replies to a failed move at once, while
-the robot still coasts.
+``ROLLS_AFTER_MOVE_S``: after a controlled move. The reply to a failed move comes while the robot
+still coasts.
 
 ``ROLLS_LONG_S``: after a reply which says that the wheels did not stop in time.
 """
@@ -69,8 +69,7 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the current heading is exactly zero because the server was restarted.
 
-        A restarted server reports zero until its first forward drive (RM). Without a restart, the
-        heading can also pass through zero. But then the previous heading was near zero.
+        A heading that only passes through zero was near zero before.
 
         ``before_rad``: the previous heading, or None.
         """

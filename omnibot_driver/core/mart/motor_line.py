@@ -2,8 +2,8 @@
 
 """A motor's speed as a function of its motor units: a straight line that the driver learns.
 
-A command sets the motor units, 0 to 127. The speed is in nominal units: at 10 motor units, an ideal
-motor has the speed 10. This module knows units; it does not know wheels or time.
+Motor units: 0 to 127. Nominal units of speed: an ideal motor has 10 at 10 motor units. This module
+does not know wheels or time.
 """
 
 import math
@@ -15,7 +15,7 @@ MOST_DEAD: Final = 20.0
 SLOPE_SD, OFFSET_SD = 0.3, 4.0
 """Standard deviations of ``slope`` and ``offset`` in a MotorLine before it has learned anything.
 
-At that time, its slope is about 1, and its offset is 0. The offset is in nominal units.
+The offset is in nominal units.
 """
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 """Standard deviations of the changes of ``slope`` and ``offset`` between two measurements.
@@ -48,8 +48,7 @@ class MotorLine:
 
         ``speed``: in nominal units.
 
-        ``doubt``: factor by which the assumed standard deviation of the measured speed is
-        multiplied. With a larger factor, the measurement changes the line less.
+        ``doubt``: factor for the assumed standard deviation of the measured speed.
         """
         self._learned = True
         if self._ss < SLOPE_SD**2:
@@ -73,11 +72,9 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Record that the motor does not turn with ``units``.
+        """Record that the motor does not turn with ``units``: lower the offset accordingly.
 
-        If the line gives a positive speed for these units, lower its offset until the speed is
-        zero. The cause may also be an obstacle, so the offset becomes as uncertain as before the
-        line learned anything.
+        An obstacle may be the cause, so the offset becomes as uncertain as at the beginning.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2
@@ -85,8 +82,7 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add ``slope`` and ``offset`` to the slope and the offset of the line.
 
-        The caller uses this method if only the other motor was measured. The line then changes by
-        the same amounts as the line of the other motor.
+        For a motor that was not measured: its line then changes like that of the other motor.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

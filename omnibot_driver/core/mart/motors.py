@@ -2,9 +2,8 @@
 
 """What the driver has learned about the two motors: how their speeds depend on the motor units.
 
-A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. The speeds of a
-``MotorLine`` are in nominal units: at 10 motor units, an ideal motor has the speed 10. This module
-knows units, m/s and rad/s; it does not know what is commanded.
+Each motor has a ``MotorLine``. This module knows units, m/s and rad/s; it does not know what is
+commanded.
 """
 
 import copy
@@ -25,8 +24,7 @@ Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Smallest number of motor units for which the ratio of the two motors' speeds is computed.
 
-For fewer units, the driver uses the ratio at ``BALANCE_UNITS``, because an error of a ``MotorLine``
-changes the ratio too much at low speeds.
+Below it, the driver uses the ratio at ``BALANCE_UNITS``, which is more exact.
 """
 
 
@@ -66,8 +64,8 @@ class Motors:
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
         """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
-        ``seen_radps``: the measured rate of the turn in progress, in which both motors have
-        ``units``. This method does not store what this rate shows; the method ``spun`` stores it.
+        ``units``, ``seen_radps``: units of both motors, and measured rate, in the turn in progress.
+        Nothing is learned from them.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
@@ -99,9 +97,7 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of the motors' speeds (left / right) if each motor has ``units``.
 
-        The ratio comes from the learnt ``MotorLine`` of each motor, but is limited to
-        ``motor_balance`` ± MOST_UNEQUAL. A ``MotorLine`` can be wrong, because the network may have
-        lost or duplicated a request to change the speed.
+        The learnt ratio is limited to ``motor_balance`` ± MOST_UNEQUAL, because it can be wrong.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
@@ -120,7 +116,7 @@ class Motors:
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
         """Return the speeds of the right and the left wheel, in m/s, not negative.
 
-        If a turn is so tight that the inner wheel would have to turn backward, its speed is 0.
+        If the inner wheel would have to turn backward, its speed is 0.
         """
         half = rate_radps * self._settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
@@ -133,8 +129,8 @@ def _units(lines: Lines, speed: float) -> int:
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
     """Learn from a turn on the spot in which both motors had ``units``.
 
-    ``speed``: the mean of both motors' speeds. The mean does not show the speed of each motor. So
-    slope and offset change by the same amounts in both motor lines.
+    ``speed``: the mean of both motors' speeds. Slope and offset change by the same amounts in both
+    motor lines.
     """
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2

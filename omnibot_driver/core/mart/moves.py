@@ -25,8 +25,7 @@ from omnibot_driver.core.mart.words import Request
 UNLIKELY: Final = 1 / 3
 """Assumed error of the odometry if the server may have run a move twice, but probably has not.
 
-It is a standard deviation, as a fraction of the move. If the server has run the move twice, the
-true error is the whole move, which is three of these standard deviations.
+The error is a standard deviation, as a fraction of the move.
 """
 RAN_TWICE: Final = (
     "the network has delivered a controlled move twice, and the driver has stopped the second run"
@@ -45,8 +44,7 @@ DISCARDED: Final = "; the goal of cmd_pose is discarded: remove the cause, then 
 OFF_COURSE_RAD: Final = 0.5
 """Assumed standard deviation, in rad, of the angle by which the robot turns in a failed move.
 
-If one wheel does not turn, the robot turns and the move fails. The server reports only the failure,
-and not the angle.
+The server does not report this angle.
 """
 LEAST_STOP_S: Final = 0.3
 """Shortest time in s that the server needs to stop a controlled move after SL or SS.
@@ -128,10 +126,8 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn, the driver downloads the server's record, which is more exact than the wheel's
-        measurement, and learns from the record later. It learns from the wheel's measurement at
-        once if the network is bad, if the driver needs no more records, or if another job is in
-        progress.
+        After a turn, learn later, from the server's record. If the network is bad, if no more
+        records are needed, or during another job, learn at once from the wheel.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -226,9 +222,7 @@ class Moves(Asking):
         The result is False in two cases:
 
         * The driver has sent no stop after the move.
-        * The move was complete, and the server answered again very soon. A second run would have
-          delayed this answer by ``LEAST_STOP_S`` or more if it was stopped, and by about the
-          duration of the move if it ended by itself.
+        * The move was complete, and the server answered too soon for a second run.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

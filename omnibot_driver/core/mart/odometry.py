@@ -36,8 +36,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of the current controlled move, also after the move while the
-        server may run it a second time. Otherwise, and if the server is lost, it is None.
+        ``blind_since_s``: start time of a controlled move that is in progress, or that the server
+        may run a second time. None otherwise, and if the server is lost.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s
@@ -64,8 +64,6 @@ class MartOdometry(Reckoning):
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
         """Return the possible errors of the motion that is predicted since the last encoder count.
-
-        They include the errors that result from the uncertain time of this count.
 
         ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the current
         controlled move, or None.

@@ -44,31 +44,26 @@ STOPS_S: Final = 1.0
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 """Time in s between the server's first reply and the first query of the battery voltage (VOLTS).
 
-VOLTS crashes a server that is starting up, and the first reply may come from such a server, so
-VOLTS is not sent earlier. It is not sent later, because the driver needs the voltage before the
-first motion, which can begin STARTS_UP_S after the first reply.
+VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
 """Time in s since the last voltage query (VOLTS) after which the next one is sent in any case.
 
-Usually, VOLTS is not sent soon after an unanswered request: the server may have restarted, and
-VOLTS crashes a server that is starting up. ``VOLTS_S`` limits this wait.
+Earlier, VOLTS waits after unanswered requests (see ``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
 
-``SILENT_S``: time since the last reply. Twice the average duration of a query is added to it.
-
-``SILENT_AFTER_MOVE_S``: time since the last reply, if a duplicate of a move may be running.
-
-``GREET_AGAIN_S``: time between two HELLOs.
+* ``SILENT_S``: since the last reply; twice the average duration of a query is added.
+* ``SILENT_AFTER_MOVE_S``: the same, if a duplicate of a move may be running; nothing is added.
+* ``GREET_AGAIN_S``: since the last HELLO.
 """
 COMMANDED: Final = "a motion command or a stop arrived; stop sending commands, then call again"
 ESTOPPED: Final = "the e-stop was latched during the request; release it, then call again"
 COPY_S: Final = 0.25
 """Time in s after a controlled move within which the server must answer a query (ENC or HELLO).
 
-If it does not, it may be executing a duplicate of the move.
+Otherwise, the server may be executing a duplicate of the move.
 """
 
 
@@ -78,8 +73,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A motion command or a stop cancels the current job. There is one exception: the download of
-        a turn's record is not cancelled by a repetition of the present goal.
+        A command cancels the current job; but a repeated goal does not cancel the download of a
+        turn's record.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -111,7 +106,7 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is busy. The driver expects no reply from a busy server.
+        """Return whether the server is busy, so that the driver expects no reply.
 
         A server that was silent before the stop of a drive is not busy: it may be lost.
         """
@@ -134,11 +129,7 @@ class Pilot(Hearing):
     def fell_silent(self) -> None:
         """Begin a new connection after a long silence, because the server may have been restarted.
 
-        Do nothing in two cases:
-
-        * During a motion or a job.
-        * If the server's stop port may hang (``Health.outlived``). A failure of the network may
-          have caused the silence, and then the port still hangs.
+        Do nothing during a motion or a job, or if the stop port may hang (``Health.outlived``).
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()
@@ -241,19 +232,17 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        The server does not answer during a move. So a reply that came after the last move shows
-        that no duplicate of this move is running.
+        A reply since the last move excludes the duplicate, because the server is silent during a
+        move.
         """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time at which the driver must stop a suspected duplicate of a controlled move.
+        """Time at which to stop a suspected duplicate of a move; infinity without one.
 
-        The driver stops it with the commands SL and SS. The time is infinity if no duplicate is
-        suspected, and in every state except STILL: after a forward or backward drive, SL and SS
-        would hang the server.
+        Only in STILL: in other states, the stop commands SL and SS would hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf
@@ -266,8 +255,7 @@ class Pilot(Hearing):
     def _may_ask_volts(self, now: float) -> bool:
         """Return whether the query of the battery voltage (VOLTS) may be sent now.
 
-        VOLTS crashes a server that is starting up. So the driver does not send VOLTS soon after an
-        unanswered request, because the server may have been restarted.
+        VOLTS crashes a server that is starting up, so VOLTS waits after an unanswered request.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

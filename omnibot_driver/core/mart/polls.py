@@ -2,8 +2,8 @@
 
 """The times at which queries are due, in each state of the robot's motion.
 
-A sonar query takes 55 ms, so it is sent only while the robot is at rest. This module knows queries
-and states; it does not know the replies. The caller passes the time.
+A sonar query takes 55 ms, so it is sent only at rest. This module knows queries and states; it does
+not know the replies.
 """
 
 import math
@@ -38,9 +38,8 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 In states that are not listed here, the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between their queries. With less time, a late copy of one
-sonar's reply could be taken for the other's reply. The values would not show the mistake, because
-both sonars report the same value if nothing is near."""
+"""The two sonars, and the least time in s between their queries. After less time, a late copy of
+one sonar's reply could be taken for the other's reply."""
 
 
 class Polls:
@@ -58,8 +57,8 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The most urgent query has the smallest sum of due time and period. This sum grows each time
-        the query is sent, so each query has its turn, even if exchanges are slow.
+        The most urgent query has the smallest sum of due time and period, so that each query has
+        its turn.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]
@@ -87,8 +86,7 @@ class Polls:
     def missed(self, word: Word) -> None:
         """Make a query due at once, because it had no answer.
 
-        If the repeated query has no answer either, it is due at its usual time. This leaves time
-        for the other queries.
+        If the repetition has no answer either, the query is due at its usual time.
         """
         if word not in self._repeated:
             self._repeated.add(word)

@@ -42,8 +42,7 @@ The last measurement is the last encoder count or the last heading.
 FRESH_S: Final = 0.2
 """Age of the last heading, in s, up to which the measured turn rate is valid."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
-"""Assumptions about the end of a forward drive (RM), for the case that no heading was read after
-the stop.
+"""Assumptions about the end of a forward drive (RM) without a heading after the stop.
 
 ``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate in rad/s.
 ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
@@ -53,19 +52,14 @@ the stop.
 class Reckoning(CorrectedPose):
     """Dead reckoning by the encoder count and the relative heading.
 
-    ``motion``: the motion to which the next encoder count belongs. After the last count of a
-    motion, the value is Motion.NONE.
-
-    ``stands``: whether the robot was stopped. It may still coast.
-
-    ``slowing_since_s``: time of the first stop command for this motion, or None.
-
-    ``left_over_right``: expected wheel speed ratio (left / right) while the heading is unknown,
-    otherwise None.
-
-    ``bend``: standard deviation of ``left_over_right``.
-
-    ``begins_in_move``: whether the odometry was reset during the current controlled move.
+    * ``motion``: the motion to which the next encoder count belongs; Motion.NONE after the last
+      count of a motion.
+    * ``stands``: whether the robot was stopped. It may still coast.
+    * ``slowing_since_s``: time of the first stop command for this motion, or None.
+    * ``left_over_right``: expected wheel speed ratio (left / right) while the heading is unknown,
+      otherwise None.
+    * ``bend``: standard deviation of ``left_over_right``.
+    * ``begins_in_move``: whether the odometry was reset during the current controlled move.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -146,8 +140,8 @@ class Reckoning(CorrectedPose):
     def rest(self, longest: float = math.inf) -> float:
         """End the motion. Call this after its last encoder count, which includes the coasting.
 
-        After a turn on the spot for which the server has reported an implausible angle, return the
-        angle from the wheel's encoder minus the server's angle, in rad. Otherwise, return 0.
+        Return the wheel's angle of a turn minus an implausible angle of the server, in rad;
+        otherwise 0.
 
         ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
         """
@@ -175,8 +169,7 @@ class Reckoning(CorrectedPose):
     def _doubt_unread_turn(self) -> None:
         """Add an error to the pose at the end of a forward drive (RM) whose last heading is old.
 
-        The heading is old if none was read after the robot was stopped. The robot may have turned
-        since the last heading was read.
+        The robot may have turned since that heading.
         """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)
@@ -244,9 +237,8 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        While the start command may have been lost, the pose assumes that the last encoder count is
-        from before the start. But the count may be from after the start. These values are the
-        motion that it shows in that case. At all other times, both values are zero.
+        Both are zero unless the start command may have been lost. The last encoder count shows this
+        motion if it is newer than the start.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -280,8 +272,7 @@ class Reckoning(CorrectedPose):
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct a heading that was computed from commands, when the server has reported the turn.
 
-        Return the correction in rad. The correction removes an error of the heading. It is not a
-        motion of the robot.
+        Return the correction in rad, which is not a motion of the robot.
         """
         if not self._guessed:
             return 0.0
@@ -320,9 +311,8 @@ class Reckoning(CorrectedPose):
     def stale(self, now: float) -> tuple[float, float]:
         """Return for how many s the turn rate has been out of date, and the resulting error.
 
-        The turn rate is out of date if the last heading is older than FRESH_S. The error is the
-        heading's standard deviation in rad. In all motions except a forward drive (RM), both values
-        are 0.
+        The error is the heading's standard deviation in rad. Both values are 0 except in a forward
+        drive (RM).
         """
         stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:
@@ -331,9 +321,8 @@ class Reckoning(CorrectedPose):
 
 
 def _turn_error_rad(seconds: float) -> float:
-    """Return the standard deviation, in rad, of a turn that lasts ``seconds``.
+    """Return the standard deviation, in rad, of a turn that is predicted over ``seconds``.
 
-    The turn is predicted from the turn rate at its beginning. This rate is known, but its later
-    changes are not.
+    Only the turn rate at the beginning is known.
     """
     return min(math.pi, ACCELERATION_RADPS2 * seconds * seconds / 2)

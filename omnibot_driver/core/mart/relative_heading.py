@@ -3,7 +3,7 @@
 """The turn of the robot within a motion, from the relative heading that the server reports.
 
 Some servers update the heading only in a forward drive (RM). This module knows rad and times; it
-does not know commands. The caller passes the time.
+does not know commands.
 """
 
 import math
@@ -22,14 +22,12 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 OLD_RAD: Final = 0.01
 """Largest difference in rad between two headings that are regarded as the same heading.
 
-A forward drive (RM) sets the server's heading to zero. If the first heading after the start of RM
-is the same as the last one before, it may be a late reply with a heading from before RM.
+A forward drive (RM) begins at zero: an unchanged heading after the start may be a late reply.
 """
 MOST_RAD: Final = 1e7
 """Limit in rad. A reported heading of this size or more is rejected.
 
-The server integrates the turn rate over time, in unsigned milliseconds. If its clock is set back, a
-negative time step becomes a huge one, and the server reports 1e15 degrees, for example.
+A server whose clock is set back reports 1e15 degrees, for example.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is predicted after its last report."""
@@ -42,15 +40,11 @@ SPREADS: Final = 4
 class RelativeHeading:
     """The relative heading within a motion.
 
-    ``told_s``: time of the last accepted heading.
-
-    ``from_s``: earliest time at which the server may have measured the last certain heading. A
-    heading is certain if it surely is the reply to the last query (RMRA), and not a late reply to
-    an earlier one.
-
-    ``changed_s``: time of the last change of heading.
-
-    ``same``: number of equal headings since the last change.
+    * ``told_s``: time of the last accepted heading.
+    * ``from_s``: earliest time at which the last certain heading may have been measured. A certain
+      heading surely answers the last query (RMRA).
+    * ``changed_s``: time of the last change of heading.
+    * ``same``: number of equal headings since the last change.
     """
 
     def __init__(self) -> None:
@@ -167,8 +161,7 @@ class RelativeHeading:
     def turned_rad(self, at_s: float, *, stands: bool) -> float:
         """Return the turn from the beginning of the motion until ``at_s``, in rad.
 
-        The turn since the last heading is predicted. ``stands``: whether the robot was stopped. If
-        so, nothing is predicted.
+        The turn since the last heading is predicted, unless the robot was stopped (``stands``).
         """
         ahead_s = 0.0 if stands else min(max(0.0, at_s - self.told_s), AHEAD_S)
         return self._turned_rad + self.rate_radps * ahead_s

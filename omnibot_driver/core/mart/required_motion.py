@@ -20,8 +20,7 @@ SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 RAMP_LEFT: Final = 0.2
 """Part of the final yaw rate that the command may still lack when a turn on the spot begins.
 
-The server cannot change the rate of a turn that has begun. If an acceleration limit makes the
-commanded rate rise gradually, the turn begins only near the end of this rise.
+The server cannot change the rate of a turn.
 """
 
 

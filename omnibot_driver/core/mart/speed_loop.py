@@ -24,8 +24,7 @@ twice.
 MOST_BACKWARD: Final = 5
 """Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-A slow network may deliver a command twice, so that the units change twice. The driver does not
-notice this while the robot drives backward.
+There, the driver does not notice that a command arrives twice.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
@@ -38,17 +37,14 @@ LARGE_UNITS: Final = 3
 MOST_MISSED: Final = 4
 """Largest number of unanswered changes of the units that the driver examines together.
 
-A change that the server did not answer may have been lost. The driver finds out from the measured
-speeds which changes have arrived at the server.
+The measured speeds show which of these changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """How the driver learns about the motors if exchanges with the server are slow.
 
-``LEARN_TRIPS``: number of exchanges. The averaging window lasts LEARN_S, plus the duration of this
-number of exchanges.
+``LEARN_TRIPS``: number of exchanges whose duration prolongs the averaging window (LEARN_S).
 
-``LESS_PER_S``: relative growth of a measured speed's standard deviation, for each second that an
-exchange takes.
+``LESS_PER_S``: relative growth of a measured speed's standard deviation, per s of an exchange.
 """
 SLOWEST_MPS: Final = 0.015
 """Measured wheel speed in m/s above which a wheel is regarded as turning."""
@@ -61,8 +57,7 @@ LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
 """Factor by which the driver raises the units of the next RM (forward) if no motor has turned.
 
-The raised units are at most MOST_DEAD. If the commanded speed needs more units than MOST_DEAD, the
-driver uses the units that the speed needs.
+The raised units are at most MOST_DEAD, unless the commanded speed needs more.
 """
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
@@ -70,13 +65,11 @@ HOLD_AFTER_S: Final = 1.0
 integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units.
+"""Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units,
+as a multiple of the squared relative change.
 
-The variance grows by one of these factors, times the square of the relative change. The factors are
-large, because a wrong ratio lasts for the whole motion.
-
-``COPIED``: for a change that the network may deliver twice. The driver assumes this if queries take
-longer than ``SLOW_TRIP_S`` (s).
+``COPIED``: for a change that may arrive twice, because queries take longer than ``SLOW_TRIP_S``
+(s).
 
 ``MISSED``: for a change that the server did not answer.
 """
@@ -86,11 +79,10 @@ longer than ``SLOW_TRIP_S`` (s).
 class _Side:
     """One motor, and the wheel that it turns.
 
-    ``stood_s``: for how long the wheel has not turned, in s, although the motor has enough units to
-    turn it.
-
-    ``window_units_s``: sum of units * seconds in the averaging window. ``window_m``: distance in m
-    in the averaging window.
+    * ``stood_s``: time in s for which the wheel has not turned, although the motor has enough
+      units.
+    * ``window_units_s``: sum of units * seconds in the averaging window.
+    * ``window_m``: distance in m in the averaging window.
     """
 
     line: MotorLine
@@ -109,8 +101,7 @@ class SpeedLoop(Motors):
 
     ``trip_s``: average duration of an exchange with the server, in s.
 
-    ``part``: relative size of the last change of the motors' units. It is the sum of two ratios,
-    one for each motor: the amount of the change, divided by the motor's units before the change.
+    ``part``: relative size of the last change of the motors' units, summed over both motors.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -138,8 +129,8 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors.
 
-        The result is what the slower wheel needs for its speed, but at least LEAST_UNITS and at
-        most 60. If an earlier start turned no motor, it can be more than the wheel needs.
+        The slower wheel determines the units, from LEAST_UNITS to 60. After a start that turned no
+        motor, they are higher.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -154,13 +145,12 @@ class SpeedLoop(Motors):
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
-        """Record that neither motor turns.
+        """Record that neither motor turns: the present units are too few.
 
         ``units``: the units that both motors have; None for the current units of each motor.
 
-        These units are then regarded as too few to turn the motor. Exception: MOST_DEAD units or
-        more turn every motor, so such a motor is regarded as blocked, and nothing is learned from
-        it.
+        Nothing is learned from a blocked motor: one that must turn with its units (from MOST_DEAD
+        on, or by its line).
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -178,16 +168,15 @@ class SpeedLoop(Motors):
     def blocked_s(self) -> float:
         """Time in s for which a wheel has not turned, although its motor has enough units.
 
-        If neither wheel has turned, the result is the longer one of the two wheels' times.
+        The longer one of the two wheels' times.
         """
         return max(self._right.stood_s, self._left.stood_s)
 
     @property
     def left_over_right(self) -> float:
-        """Expected ratio of left to right wheel speed.
+        """Expected ratio of left to right wheel speed at the current units, by the learned lines.
 
-        It is computed from the current units of both motors, and from the two motor lines that the
-        driver has learned. If both motors have equal units, the ratio is ``balance``.
+        If both motors have equal units, the ratio is ``balance``.
         """
         return self._ratio(self._right.units, self._left.units)
 
@@ -231,8 +220,7 @@ class SpeedLoop(Motors):
 
         The displacement also updates the heading error.
 
-        ``right_only``: whether only the right wheel was measured. In this case, the ``MotorLine``
-        of the left wheel is changed by the same amounts as that of the right wheel.
+        ``right_only``: whether only the right wheel was measured. Both lines then change equally.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
@@ -262,8 +250,8 @@ class SpeedLoop(Motors):
     def _judge_missed(self, *, right_only: bool) -> None:
         """Undo the unanswered changes of the units that have probably not arrived at the server.
 
-        For each change in ``_missed``, it is unknown whether it has arrived. The driver assumes the
-        combination of arrived and lost changes whose units fit the measured speeds best.
+        The driver assumes the combination of arrived and lost changes that fits the measured speeds
+        best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:
@@ -342,8 +330,7 @@ class SpeedLoop(Motors):
     def answered_again(self) -> None:
         """Record that the server may have carried out a change twice, because it answered twice.
 
-        This may be any change of this motion since the last such reply. So the wheel speed ratio is
-        less certain by the largest effect that one of these changes would have.
+        The uncertainty of the wheel speed ratio grows by the largest possible effect.
         """
         self._unsure += self._copy**2
         self._copy = 0.0

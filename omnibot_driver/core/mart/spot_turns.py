@@ -22,30 +22,23 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: limit in the first EARLY_S (s) of a steady rate, if the driver has not learned from a turn
-yet.
+``OFF``: in the first EARLY_S (s) of a steady rate, if the driver has not learned from a turn yet.
 
-``OFF_AGAIN``: limit in all other cases. It is larger, because a new start disturbs the robot's
-motion more than a small error of the rate.
+``OFF_AGAIN``: otherwise. A new start disturbs the motion.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Limits of what the driver learns from turns that something slows down.
+"""Limits of what the driver learns from slow turns, as fractions of the commanded rate.
 
-Both limits are fractions of the commanded rate.
+``HELD``: lowest measured rate to learn from, after the first learned turn.
 
-``HELD``: after the driver has learned from a turn, it learns only from turns with at least this
-measured rate.
-
-``LEAST_LESSON``: lowest rate that the driver learns. If the measured rate is lower, the driver
-learns this lowest rate instead.
+``LEAST_LESSON``: lowest rate that is learned, even if the measured rate is lower.
 """
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Limits that show that something held the robot in a turn.
+"""Fractions of the commanded rate that show that something held the robot in a turn.
 
-If a turn is slower than HINDERED, and the next turn is faster than TOO_FAST, something held the
-robot in the slow turn. Both limits are fractions of the commanded rates.
+A turn slower than HINDERED was held if the next turn is faster than TOO_FAST.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
@@ -59,20 +52,15 @@ STEADY: Final = 0.03
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-``SPINS_UP_S``: time in s. The turn must last at least this time, plus the averaging time of the
-rate.
-
-``SEEN_RAD``: least angle of the turn, in rad.
-
-``TOLD_RAD``: for turns by more than this angle, in rad, the angle from the server is used. For
-smaller turns, the angle that the wheel measured is used.
+* ``SPINS_UP_S``: least duration of the turn in s, without the averaging time of the rate.
+* ``SEEN_RAD``: least angle of the turn, in rad.
+* ``TOLD_RAD``: angle in rad above which the server's angle is used instead of the wheel's.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Terms of the limit by which the driver checks the number in the reply to a stop command.
+"""Terms of the largest plausible error of the angle in the reply to a stop command.
 
-The number should be the angle of the turn. If it differs from the expected turn by more than the
-limit, it may be an encoder count instead. The limit is UNSURE_RAD (rad), plus UNSURE_PART times the
-expected turn, plus the angle by which the robot turns during two queries.
+UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two queries. Beyond
+it, the number may be an encoder count.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
@@ -89,12 +77,10 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn. After an SSP request, they are the units that SSP has
-    set for the next turn. At the beginning of a connection, the value is 0.
-
-    ``seen_radps``: measured rate of the last turn, in rad/s.
-
-    ``settings`` may be replaced.
+    * ``units``: motor units of the last turn, or those that SSP has set for the next one; 0 at the
+      beginning of a connection.
+    * ``seen_radps``: measured rate of the last turn, in rad/s.
+    * ``settings``: may be replaced.
     """
 
     def __init__(self, settings: MartSettings, odometry: MartOdometry, loop: SpeedLoop) -> None:
@@ -126,10 +112,9 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The caller must send SSP before the check of the IMU that precedes each turn.
+        The caller must send SSP before the check of the IMU.
 
-        ``delay_s``: shortest time in s between two SSP requests. After this time, no copy of the
-        first one can arrive any more.
+        ``delay_s``: time in s after which no copy of an earlier SSP can arrive.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -242,14 +227,11 @@ class SpotTurns:
     ) -> None:
         """Evaluate a turn that was stopped.
 
-        ``degrees``: angle in the reply to the stop command; None if there was no angle.
-
-        ``uncounted_s``: time in s from the last encoder count to the first stop command.
-
-        ``turned_s``: time in s since the turn began.
-
-        ``disturbed``: whether the network is disturbed. On a disturbed network, the driver does not
-        learn from this turn.
+        * ``degrees``: angle in the reply to the stop command; None if there was no angle.
+        * ``uncounted_s``: time in s from the last encoder count to the first stop command.
+        * ``turned_s``: time in s since the turn began.
+        * ``disturbed``: whether the network is disturbed, so that nothing is learned from this
+          turn.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -275,9 +257,7 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Undo what was learned from a slow turn if the next turn is fast.
 
-        Something has then held the robot in the slow turn. The caller calls this method before the
-        driver learns from a turn. At a slow turn, the method stores what the driver knows. If the
-        next turn is fast, the method restores that.
+        Something has then held the robot. Call this before the driver learns from a turn.
 
         ``part``: the turn's measured rate divided by its commanded rate.
         """

@@ -39,9 +39,7 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 NAME_WAIT_S: Final = 2.0
 """Longest time in s for which a controlled move waits until no earlier HELLO can arrive after it.
 
-On a network that loses many datagrams, the driver sends HELLO so often that this time would never
-come. After this wait, the answer to HELLO proves nothing about a duplicate of the move
-(``_greeted_before``).
+After this wait, an answer to HELLO does not exclude a duplicate of the move.
 """
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""
@@ -111,9 +109,8 @@ class Starts(FailedStarts):
     def _switch_motors_off(self, now: float) -> Packets:
         """Return the next request that switches off the motors. No packets while it must wait.
 
-        The requests are MCS, which writes "stop" to both motors, and MSM, which ends the effect of
-        MCS. Each waits until no late reply to an earlier request can be mistaken for its own reply.
-        MSM also waits until no duplicate of MCS can arrive after MSM.
+        MCS stops both motors; MSM ends the effect of MCS. They wait for late replies to earlier
+        requests, and MSM for duplicates of MCS.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -138,11 +135,8 @@ class Starts(FailedStarts):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether ``start`` must wait, because an earlier HELLO may arrive after it.
 
-        Only a controlled move waits. The server might answer this HELLO just before a duplicate of
-        the move begins. The driver would take the answer as proof that there is no duplicate.
-
-        The wait ends after ``NAME_WAIT_S``, even if a HELLO may still arrive. There is no wait
-        after a fresh check of the IMU, because the driver has already waited before that check.
+        The answer to this HELLO would falsely exclude a duplicate of a controlled move. The wait
+        ends after ``NAME_WAIT_S``; a fresh check of the IMU already includes the wait.
         """
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False
@@ -174,9 +168,11 @@ class Starts(FailedStarts):
     def _check(self, now: float) -> Packets:
         """Return the request that checks the IMU; no packets while it must wait.
 
-        It waits until the check is due. It also waits while a late reply to another request could
-        be mistaken for the reply to the check. After a short silence, it waits for a heading, which
-        shows whether the server was restarted.
+        Reasons to wait:
+
+        * The check is not due.
+        * A late reply could be mistaken for the reply to the check.
+        * After a short silence, no heading shows yet whether the server was restarted.
         """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):

@@ -105,8 +105,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
 }
 """The commands that are allowed in each state. HELLO is sent without a check of this table.
 
-The commands in NEEDS_IMU also require that a check (RESET or CHECK) has just shown that the IMU
-works.
+The commands in NEEDS_IMU also require a recent successful check of the IMU (RESET or CHECK).
 """
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
@@ -129,8 +128,8 @@ LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SL, SS),
 }
-"""For each motion, the commands that stop the motors by the stop port. The driver sends them if the
-command port stays silent. They are the last resort, because they may hang the server."""
+"""Commands that stop each motion by the stop port, if the command port stays silent. They are the
+last resort, because they may hang the server."""
 
 STARTS: Final[Mapping[Word, Motion]] = {
     RM: Motion.REFERENCE,
@@ -147,16 +146,14 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server does not answer most of these commands: it starts the motors, or waits
-for the IMU. Only the controlled turns MCR and MCL get an answer, a failure that names the dead IMU.
-Before this answer, some servers turn the robot for 0.5 s.
+With a dead IMU, the server starts the motors, or waits, without an answer. MCR and MCL fail, on
+some servers after a turn of 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
 """Commands that do harm if a duplicate of them arrives after another motion has begun.
 
-Before the next start, the driver waits until no duplicate of such a command can arrive. A check of
-the IMU that the start needs comes after this wait.
+The next start, and its check of the IMU, wait until no duplicate can arrive.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {
