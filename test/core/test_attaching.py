@@ -142,7 +142,7 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
     """If the first poses come late and agree, motion is computed with their heading from then on.
 
-    Before, the odometry has assumed heading 0. Odom does not jump.
+    Until then, the odometry assumes heading 0. Odom does not jump.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):
@@ -216,7 +216,7 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """The heading is known from two poses that agree until a gap of 20 displacements.
+    """The heading is known once two poses agree, and unknown after a gap of 20 displacements.
 
     A heading of 0 that is only assumed counts as unknown.
     """

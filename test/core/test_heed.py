@@ -39,7 +39,7 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 ) -> None:
     """``process`` returns False if a read leaves the session nothing to write or to report.
 
-    Most reads that contain only IMU readings do so.
+    This is the result of most reads that contain only IMU readings.
     """
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0

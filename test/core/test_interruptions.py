@@ -106,7 +106,7 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
 def test_a_restarted_board_that_first_moves_unheard_does_not_move_odom_to_its_origin(
     frame: str,
 ) -> None:
-    """If a restarted board drives for 0.4 s unheard, odom still continues from its last pose.
+    """If a restarted board drives for 0.4 s unheard, odom still continues from where it was.
 
     The board's first poses are neither at its new origin nor at the old place.
     """

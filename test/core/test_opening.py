@@ -38,7 +38,7 @@ def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
     """The state follows the port and the data of the board.
 
     * Closed port: disconnected.
-    * Open port: connecting.
+    * Port that has just been opened: connecting.
     * Board that reports a pause: paused.
     * Started board: nominal.
     """

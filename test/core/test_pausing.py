@@ -52,7 +52,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """If another program has just paused the board, a request for a pause sends no P.
+    """If another program has just paused the board, the driver sends no P on a request for a pause.
 
     The driver sends P only after new data, and a paused board sends none.
     """

@@ -87,7 +87,7 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
     """A request that was not written to a lost port is not written after the port opens again.
 
-    The request is a reset, which has a Stop and an R.
+    The request is a reset, for which the driver writes Stop and R.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -197,7 +197,7 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
     """The first «Paused» text of a connection does not show that the board has restarted.
 
-    The driver knows no earlier number to compare. So a reset whose R is lost fails.
+    The driver knows no earlier number to compare with. So a reset whose R is lost fails.
     """
     bench = Bench(run=False)
     bench.open()

@@ -235,9 +235,9 @@ def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
 ) -> None:
     """If the odometry is reset near the end of a gap, odom does not contain the lost motion.
 
-    After a reset near the beginning, odom contains it. The gap lasts 3 s.
-    The displacement after the gap has an estimate in both cases. Without the motion, it is zero,
-    and its twist is unknown.
+    After a reset near the beginning, odom contains it. The gap lasts 3 s. The displacement after
+    the gap has an estimate in both cases. Without the lost motion, the pose of this estimate is
+    zero, and its twist is unknown.
     """
     for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
         odometry, trip = Odometry(SETTINGS), Trip()

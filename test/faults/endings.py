@@ -64,7 +64,7 @@ class Ending:
 
     ``read``: whether the driver ends only when it reads data again.
 
-    In the last two cases, the robot may drive longer.
+    With ``full`` or ``read``, the robot may drive longer.
     """
 
     end: Callable[[Rig], object]

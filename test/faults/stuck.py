@@ -22,7 +22,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
     ``seconds``: time for which the driver gets commands. The adapter holds the data for 1 s longer.
 
-    ``mute``: whether the driver gets no data from the board in this time.
+    ``mute``: whether the driver gets no data from the board while the adapter holds its data.
     """
     rig.drive()
     rig.terminal.deaf = True

@@ -2,8 +2,8 @@
 
 """Faults in random order, several of them at the same time, while random commands move the robot.
 
-Every few steps, most faults end and the robot must come to rest, even if bytes to the board are
-still damaged. Then all faults end, and the robot must obey a new command.
+Every few steps, the commands and most faults end, and the robot must come to rest, even if bytes to
+the board are still damaged. Then all faults end, and the robot must obey a new command.
 """
 
 from collections.abc import Callable

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(8))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """One fault of a trial with two requests (``WISHES``) leaves no robot in motion.
+    """A single fault in a trial with two requests of the user (``WISHES``) does no harm.
 
     * A datagram is lost, late or doubled: the server does not hang, and the robot rests at the end.
     * The IMU dies: no motion begins more than 0.25 s later. At the end, the robot rests, or the

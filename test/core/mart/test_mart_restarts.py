@@ -240,7 +240,7 @@ def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
 ) -> None:
     """If the controller loses its power for a second in a drive, the pose does not jump back.
 
-    The count and the heading begin at zero.
+    The encoder count and the heading begin at zero again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 4.0)
@@ -269,7 +269,7 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 ) -> None:
     """After a restart in a curve, the covariance covers an error of the yaw of up to 80°.
 
-    The motors run on, and the server's heading begins at zero.
+    The motors run on, and the server's heading begins at zero, so the turn is not measured.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)
@@ -347,9 +347,9 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """On a bad network, a restarted server without MCS is stopped by a turn of one degree.
+    """Even on a bad network, a turn of 1 degree stops the robot of a restarted server without MCS.
 
-    The counts that show the motion may come long after the stops.
+    The encoder counts that show the motion may come long after the stops.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()
@@ -409,7 +409,7 @@ def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot
 def test_a_quick_restart_at_rest_is_noticed_before_the_next_motion(
     boot_s: float, wait_s: float
 ) -> None:
-    """A restart at rest of less than 0.5 s is noticed before the next motion.
+    """If the server restarts within 0.5 s while the robot is at rest, the next motion waits for it.
 
     After each short silence, the driver waits for the heading, which is zero after a restart.
     """

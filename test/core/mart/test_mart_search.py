@@ -44,8 +44,9 @@ KINDS: Final = {
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
     """The search finds no failure: the server does not hang, and the robot can be stopped.
 
-    Up to two copies and one reply are late, and the IMU may die at any step. With a dead IMU, or
-    after the driver has given up, only a crash of the server is a failure.
+    It tries all cases in which up to two copies and one reply are late, and the IMU may die at any
+    step. With a dead IMU, or after the driver has given up, only a crash of the server is a
+    failure.
     """
     found = search()
     assert found.bad == ()
@@ -144,8 +145,8 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the part of the server's state in which model and firmware must agree.
 
-    While the command port is silent, the other parts cannot be observed, and are set to fixed
-    values.
+    While the command port is silent, the motion, the reason for the silence (``port``) and
+    ``released`` cannot be observed. They are then set to fixed values.
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

@@ -153,9 +153,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Slow turns, up to 17 % too fast, do not change the balance that was learned from a drive.
+    """Turns on the spot that are too fast do not change the balance that a drive has shown.
 
-    Motor units are whole numbers.
+    Motor units are whole numbers, so slow turns are up to 17 % too fast.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):

@@ -113,7 +113,7 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """A second run of a controlled move, by a late copy, is stopped within 1 s by the e-stop.
+    """If a late copy of a command repeats a controlled move, the e-stop ends this move within 1 s.
 
     The server does not answer the copy.
     """
@@ -280,9 +280,9 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """The driver waits longer than the network delay from the last usual stop to the stop port.
+    """The driver uses the stop port only when the network delay since the last usual stop is over.
 
-    The server could hang if the stop port is used directly after SM or SRM.
+    The server could hang if the stop port were used directly after a usual stop (SM or SRM).
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)

@@ -45,7 +45,7 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
     """A left wheel that is stuck in a turn is reported, and the covariance covers the error.
 
-    The true angle differs from the angle by the right wheel's encoder.
+    The encoder shows a wrong angle, because the right wheel turns twice as far as usual.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)

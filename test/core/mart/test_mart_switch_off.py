@@ -220,7 +220,7 @@ def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply:
 def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
     """The driver ends the direct control of the motors even if MCS seemed to be unknown.
 
-    A late "not supported" has seemed to be the reply to MCS.
+    A late reply to another command, "not supported", seemed to be the reply to MCS.
     """
     bench = creeping()
     network = bench.robot.network[0]
@@ -349,8 +349,9 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
     """A second copy of the reply to MSM is not taken for the reply to RST IMU (check of the IMU).
 
-    The reply to RST IMU would permit SRM (a stop), which would hang the server after the stop port.
-    A notice says that the server reports a motion although the robot is at rest.
+    The reply to RST IMU would permit SRM (a stop). But the stop port has ended the motion, so SRM
+    would hang the server. A notice says that the server reports a motion although the robot is at
+    rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -163,7 +163,7 @@ def test_a_server_without_records_is_asked_three_times(
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
     """When a few records have shown the ratio of the motors, the driver requests no more records.
 
-    The public server never closes a file that it has sent.
+    The public server never closes a file that it has sent, so it gets no needless requests.
     """
     bench = MartBench("source", motor_inequality=0.1).ready()
     for _ in range(2):

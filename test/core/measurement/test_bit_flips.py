@@ -25,7 +25,11 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""Tuples: kind of frame, byte in its payload, bit in this byte, ticks driven before the change."""
+"""Tuples that say which bit to change, and when.
+
+Each tuple: kind of frame, number of the byte in its payload, number of the bit in this byte, and
+number of ticks that the robot drives before the change.
+"""
 
 
 class Drive:

@@ -121,7 +121,10 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot may be up to 25 % too fast. If it is slow, the only possible fault is "blocked"."""
+    """A robot that is up to 25 % too fast causes no fault.
+
+    If a robot is too slow, the only possible fault is "blocked".
+    """
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -289,9 +292,10 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_four_impossible_displacements_are_a_fault_and_a_single_one_is_a_correction() -> None:
-    """Four impossible displacements in a row are a fault; three may correct the board's odometry.
+    """Four impossible displacements in a row are a fault.
 
-    A robot that rolls out after the fault causes no second fault.
+    Up to three in a row may be a correction of the board's own odometry. A robot that rolls out
+    after the fault causes no second fault.
     """
     drive = Drive()
     drive.command(0.1, 0.0, 0.0)

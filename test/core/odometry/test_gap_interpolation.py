@@ -91,7 +91,10 @@ def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
 
 
 def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
-    """A displacement after the last pose shows the present motion better than the pose."""
+    """A pose does not change the last motion if a displacement came after the previous pose.
+
+    This displacement shows the present motion better.
+    """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     bridge.missing += 1

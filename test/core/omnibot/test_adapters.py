@@ -107,7 +107,7 @@ def test_an_empty_read_changes_nothing() -> None:
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """After a lost byte, the decoder does not regard the line as calm for ten seconds.
+    """For ten seconds after a lost byte, the decoder does not regard the line as calm.
 
     In this time, it needs more evidence before it accepts a frame.
     """

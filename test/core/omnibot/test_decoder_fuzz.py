@@ -179,7 +179,7 @@ def test_work_is_linear_and_memory_bounded(
 ) -> None:
     """The decoder's work grows only linearly, even for a repeated pattern that is hard to decode.
 
-    The bytes that the decoder holds stay below its limit.
+    The number of bytes that the decoder holds stays below its limit.
     """
     stream = ADVERSARIES[name] * (THIRD // len(ADVERSARIES[name]))
     if chunk_length < THIRD:
