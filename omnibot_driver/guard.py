@@ -2,7 +2,8 @@
 
 """The guard: a separate process that stops the robot when the driver no longer can.
 
-It acts when heartbeats on standard input cease. It must import very little.
+When heartbeats on standard input cease, it repeats the stop command, or the emergency stop if the
+e-stop is latched. It must import very little.
 
 Usage: ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets as
 ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. The line ``=STOP EMERGENCY_STOP`` on standard input replaces both
@@ -86,7 +87,8 @@ def speak(last_words: Words, until: list[int], drop: bool) -> None:
 
     Return early if all lines are lost.
 
-    * ``until``: descriptors of the driver's messages. A message also ends the function.
+    * ``until``: descriptors of the driver's messages. A message also ends the function, because the
+      driver runs again.
     * ``drop``: whether to first discard output that the lines have not sent yet.
     """
     lines = {line for line, _ in last_words}

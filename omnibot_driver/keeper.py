@@ -22,7 +22,7 @@ from omnibot_driver.core.packets import Packets
 
 BEAT_S: Final = 0.1
 RESTART_S: Final = 1.0
-"""Shortest time between two starts of a guard, in s."""
+"""Shortest time between two restarts of a guard, in s."""
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
@@ -96,8 +96,8 @@ class Keeper:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
         * ``stopped``: whether the robot is already stopped. If not, the guard first stops it.
-        * ``written``: whether the driver wrote its last packets. If not, the guard discards the
-          kernel's output before its stop: it may contain motion commands.
+        * ``written``: whether the driver wrote its last packets. If not, the guard first discards
+          the kernel's output, which may contain motion commands.
         """
         self._restart_at = math.inf
         if stopped:

@@ -6,7 +6,7 @@
 * The *pacer* sleeps until a command, a timeout, a retry or a heartbeat is due.
 * The *teller* delivers events from calls and from the pacer.
 
-All threads and callers share one lock. Events are delivered in their order.
+All threads and callers share one lock. Events are delivered in the order in which they occurred.
 """
 
 import threading
@@ -35,7 +35,7 @@ UNGUARDED_S: Final = 1.5
 Stop after the shutdown."""
 SILENCE_S: Final = 0.25
 """Longest wait at shutdown, in s, for the second proof that the robot is at rest (longer for a slow
-board). This proof shows that the line has not damaged the last Stop."""
+board). This proof shows that no damaged last Stop has moved the robot."""
 BOTH_PROOFS_S: Final = 2.4
 """Longest time for both proofs at shutdown together, in s. The guard needs the rest of
 ``driver.LONGEST_END_S`` to repeat Stop."""
@@ -50,8 +50,8 @@ class Link:
     * ``report``: receives a sentence when a port is missing, and None when all are open.
     * ``failed``: receives the exception that ended a thread, which is always a bug.
 
-    The function arguments are called on any thread, in the order of the events; all except
-    ``opener`` and ``failed`` one at a time.
+    All function arguments except ``opener`` and ``failed`` are called one at a time, on any thread,
+    in the order of the events.
     """
 
     def __init__(
@@ -148,6 +148,8 @@ class Link:
 
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
+
+        If the port is already lost, the reader thread opens it once more to send Stop.
 
         Returns whether this call sent Stop and ended the threads.
         """

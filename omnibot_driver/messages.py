@@ -56,7 +56,8 @@ rad, and rates in rad/s (empty if unknown)."""
 class MessageSettings:
     """What messages contain besides measurements: frames, standard deviations and wheels.
 
-    Frame names include the prefix. Standard deviations are in SI units; 0 without a parameter.
+    Frame names include the prefix. Standard deviations are in SI units, and 0 if the board has no
+    parameter for them.
     """
 
     odom_frame: str
@@ -268,7 +269,8 @@ def time_message(nanoseconds: int) -> Time:
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
     """Return wall clock minus steady clock, in ns: the possible value nearest to ``known_ns``.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. ``known_ns``: the
+    previous result.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

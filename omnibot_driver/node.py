@@ -41,7 +41,8 @@ LOOK_EVERY_S = WARN_EVERY_S = 2.0
 class OmniBotDriver(Node):
     """The driver node. Raises ParameterError if it cannot start with the given parameters.
 
-    ``end`` is called when the driver has to end, with the exception of a bug, or None.
+    ``end`` is called when the driver has to end. Its argument is the exception that a bug has
+    raised, or None.
     """
 
     def __init__(

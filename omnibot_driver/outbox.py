@@ -2,8 +2,8 @@
 
 """A queue of calls that deliver events to listeners, in the order of the events.
 
-The calls are made one at a time and without a lock, so that a slow listener does not delay
-commands. This module does not know what is delivered.
+The calls are made one at a time, and after the lock of the events is released, so that a slow
+listener does not delay commands. This module does not know what is delivered.
 """
 
 import threading
@@ -38,13 +38,13 @@ class Outbox:
     def claim(self) -> bool:
         """Return whether the caller may bypass the queue and call the listener directly.
 
-        The caller must hold the lock under which the event occurred, and call ``release`` after
-        True.
+        The caller must hold the lock under which the event occurred. If the result is True, the
+        caller must call ``release``.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a successful ``claim``, even if the delivery has failed."""
+        """End a successful ``claim``. The caller must call this even if the delivery has failed."""
         self._delivering.release()
         if self._waiting:
             self.deliver()

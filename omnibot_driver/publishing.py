@@ -185,7 +185,7 @@ class Publishing:
     def _change_time(self, jump: TimeJump) -> None:
         """Record whether the node's time is simulated.
 
-        ROS calls this method at each change of time.
+        ROS calls this method when the node changes to simulated time or back.
         """
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 

@@ -2,7 +2,8 @@
 
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
-The reader delivers measurements itself. It must stop the robot before it releases a port.
+The reader delivers measurements itself, so that nothing delays them. It must stop the robot before
+it releases a port.
 """
 
 import math
@@ -31,7 +32,7 @@ class Reader:
 
     * ``trouble``: why a port of the board is not open; empty if all are open.
     * ``opened``: how often the port was opened.
-    * ``overruns``: losses of bytes in the kernel since the last opening; None if unknown.
+    * ``overruns``: how often the kernel has lost bytes since the last opening; None if unknown.
     """
 
     def __init__(
@@ -165,9 +166,7 @@ class Reader:
     def _process(self, now: float) -> None:
         """Let the session process received bytes whose measurements are already delivered.
 
-        The result can be a command to the board.
-
-        The caller holds the lock.
+        The result can be a command to the board. The caller holds the lock.
         """
         if self._session.inbound.process(now):
             self._shared.settle()

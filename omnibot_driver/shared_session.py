@@ -57,8 +57,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line. For a lost port that was opened
-        again, only if a standstill was still to be proved (``Shutdown.owed``)."""
+        """Whether the link wrote its last Stop to every line. After a lost port was opened again,
+        this is True only if a standstill was still to be proved (``Shutdown.owed``)."""
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
         line, and measurements showed the robot at rest after the last motion command."""
@@ -99,9 +99,9 @@ class SharedSession:
         * ``moves_base``: whether the command moves the base, so that the motion interlock must know
           of a refusal.
 
-        Raises CommandRefused if ``action`` refuses the command, or if it may have been sent before
-        or during a recent stall of this process. ``refused`` gets the reason, unless the queue of
-        events is full.
+        Raises CommandRefused if ``action`` refuses the command, or if the command may have been
+        sent before or during a recent stall of this process. ``refused`` then gets the reason,
+        unless the queue of events is full.
         """
         try:
             with self.lock:
@@ -191,7 +191,7 @@ class SharedSession:
     def _beat(self, now: float) -> None:
         """Record that the pacer thread runs, and send the guard a heartbeat if one is due.
 
-        A pause of 0.4 s counts as a stall.
+        A pause of 0.4 s between two calls counts as a stall.
         """
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)

@@ -2,8 +2,8 @@
 
 """Detection of stalls: times in which this process, or its pacer thread, did not run.
 
-A command from a stall must not be obeyed. Every ``now`` is a time of ``boot_time_s``. This module
-does not know threads.
+A command that was sent during a stall must not be obeyed. Every ``now`` is a time of
+``boot_time_s``. This module does not know threads.
 """
 
 import math

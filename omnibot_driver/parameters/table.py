@@ -60,8 +60,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""For each common parameter that some boards lack: the function that decides by the traits whether
-a board has it."""
+"""For each common parameter that depends on the traits of the board: the function that decides
+whether a board with these traits has it."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

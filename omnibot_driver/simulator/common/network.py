@@ -14,10 +14,11 @@ from random import Random
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NetworkFaults:
-    """Faults of each datagram, in both directions.
+    """Faults of a network, which apply to each datagram, in both directions.
 
-    * ``lose``, ``duplicate``: probabilities of the faults.
-    * ``delay_s``: longest random delay of a datagram or duplicate, in s. The order may change.
+    * ``lose``, ``duplicate``: probabilities that a datagram is lost or duplicated.
+    * ``delay_s``: longest random delay of a datagram or duplicate, in s. Delays may change the
+      order of the datagrams.
     """
 
     lose: float = 0.0

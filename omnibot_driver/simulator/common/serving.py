@@ -43,8 +43,8 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    * ``links``: symbolic links, one for each pseudo-terminal. One path for several gives
-      PATH-CHANNEL.
+    * ``links``: paths of symbolic links, one for each pseudo-terminal. With a single path and
+      several pseudo-terminals, the links are PATH-CHANNEL.
     * ``udp_port``: first UDP port, 0 for any free port.
 
     Raises OSError on entry if a link or a port is unavailable.

@@ -54,9 +54,10 @@ class UdpSocket:
 
 
 def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
-    """Open ``count`` sockets on consecutive ports, beginning with ``port``, or anywhere if it is 0.
+    """Open ``count`` sockets on consecutive ports, beginning with ``port``.
 
-    Raises OSError if one of the ports is not free or does not exist.
+    If ``port`` is 0, the first port is any free one. Raises OSError if one of the ports is not free
+    or does not exist.
     """
     if not 0 <= port <= LARGEST - count + 1:
         raise OSError(

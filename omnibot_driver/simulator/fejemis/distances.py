@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two forward distance sensors of the drive Teensy, which see a wall across the x axis.
+"""The two distance sensors of the drive Teensy, which look forward at a wall across the x axis.
 
-The sonar measures only when it is triggered. The module knows only pose and wall.
+The sonar measures only when it is triggered. The module knows only the pose and the wall.
 """
 
 from math import cos

@@ -34,8 +34,8 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     * ``diagnosis``, ``error_flags``: status bits of the ``fwl`` line, without the frame counter.
     * ``frozen``: the sensor repeats its last angle.
-    * ``absent``: no sensor answers; the Teensy reports the angle 0 and a sensor without a
-      measurement.
+    * ``absent``: no sensor answers; the Teensy reports the angle 0 and the status bits of a sensor
+      that has not finished its first measurement.
     """
 
     version = 100

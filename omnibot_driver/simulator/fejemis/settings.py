@@ -67,12 +67,13 @@ class FejemisSettings:
     * ``slip``: standard deviation, in m, of the distance error of a wheel that rolls 1 m.
     * ``ticks``: encoder ticks per revolution of the motor.
     * ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
-    * ``servo_degps``: speed of the servo at the full command, 1000. The default fits the manual's
-      crossover frequency of 12 rad/s.
+    * ``servo_degps``: speed of the servo at the full command, 1000. With the default, the crossover
+      frequency of the manual's controller is 12 rad/s.
     * ``sensor_zero_deg``: zero offset of the angle sensor, which the factory configuration
       corrects.
     * ``clock_ppm``, ``ids``: clock rate errors and heartbeat numbers of drive and front Teensy.
-    * ``uptime_s``: time since the boot at construction. Above ``boot_s``, the boot is over.
+    * ``uptime_s``: time for which the Teensys have run at construction. If it is longer than
+      ``boot_s``, they have booted.
     * ``swapped``: whether the drive Teensy is at the second port.
     * ``lose_inbound``: probability that a byte to a Teensy is lost.
     * ``front_m``: distance from the start to a wall in front.

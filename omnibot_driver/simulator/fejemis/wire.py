@@ -2,7 +2,7 @@
 
 """Reads and writes lines of text as a Teensy does, according to the manual and public programs.
 
-Checksum ``;NN``: 1 plus the sum, modulo 99, of the following character codes without control
+Checksum ``;NN``: 1 plus the sum, modulo 99, of the codes of all characters after it, except control
 characters (below 0x20). Numbers are parsed as by C's ``strtof``. This module must not know
 commands.
 """

@@ -93,8 +93,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        With the quirk ``keeps_speed_of_stalled_wheel``, the speed stays. The manual only implies a
-        reset.
+        The manual implies this. With the quirk ``keeps_speed_of_stalled_wheel``, the speed stays.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0

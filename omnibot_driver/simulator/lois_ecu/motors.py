@@ -157,7 +157,8 @@ class Gains:
     """Gains of the manual's speed controller.
 
     * ``feed_forward``: in percent of duty per RPM.
-    * ``low_pass``: 0..1, the part of a change of the target that each step takes over.
+    * ``low_pass``: 0..1. In each step, the controller's target changes by this part of its
+      difference to the commanded target.
     """
 
     kp: float

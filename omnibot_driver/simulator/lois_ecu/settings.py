@@ -26,10 +26,11 @@ class Quirks:
     * ``duty_drags_target``: at a commanded negative duty, each tick lowers an RPM target of 0 or
       less by 1. Requires ``ticks_of_forward_targets``.
     * ``reverse_runs_fast``: at a negative duty of the controller, each tick lowers an RPM target of
-      0 or less by 1, until the controller's next step. Requires ``ticks_of_forward_targets``.
+      0 or less by 1. The controller's next step uses the lower target, then restores the target.
+      Requires ``ticks_of_forward_targets``.
     * ``low_pass_starts_at_zero``: wheels ignore RPM targets until 0x23 is written.
     * ``extra_settings``: the settings 0x21 to 0x23 exist.
-    * ``appends_odometry``: 0x12 also sends the odometry, after the ticks.
+    * ``appends_odometry``: 0x12 sends the odometry after the ticks, with command number 0x12.
     * ``clock_in_ms``: the timestamp of 0x12 is in ms, not in ns.
     * ``deaf_while_sending``: while the board sends, it keeps only the first character that arrives.
     * ``deaf_while_counting``: the board receives nothing for 0.2 ms after each encoder tick.
@@ -49,7 +50,8 @@ class Quirks:
     * ``lenient_hex``: fields need not be hexadecimal if the checksum is right.
     * ``limits_rpm``: targets are limited to 50 RPM.
     * ``fast_control``: the controller runs every 91 ms, with the coefficients for 200 ms.
-    * ``slow_timer``: a count takes 100.7 µs instead of 100 µs, so speeds are 0.7 % too high.
+    * ``slow_timer``: a count takes 100.7 µs instead of 100 µs, so reported speeds are 0.7 % too
+      high.
     * ``slow_boot``: for 2 s after power-up, the board only stores its input.
     """
 
@@ -122,7 +124,8 @@ class LoisSettings:
     * ``wheel_radius_scale``, ``track_scale``: true value divided by nominal value.
     * ``slip``: standard deviation, in m, of the distance error of a wheel that rolls 1 m.
     * ``load_percent``: standard deviation of the load from the ground, in percent of duty.
-    * ``mark_noise``: standard deviation of the distance between encoder marks, in half periods.
+    * ``mark_noise``: standard deviation of the distance between adjacent encoder marks, in half
+      periods.
     * ``start_latitude_deg``, ``start_longitude_deg``: position of x = y = 0. The x axis points
       east.
     * ``heading_noise_deg``: standard deviation of each raw heading.

@@ -93,8 +93,8 @@ def _refuses_left_spin(server: "MartServer") -> bool:
 def _timed(server: "MartServer", text: str) -> str | None:
     """Start a straight controlled move (TF, TB) by a distance in inches.
 
-    An optional speed word comes before the distance; without the quirk ``speed_word_first``, it may
-    also come after it.
+    An optional speed word precedes the distance; without the quirk ``speed_word_first``, the word
+    may also follow the distance.
     """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]

@@ -2,8 +2,9 @@
 
 """The start of each kind of motion, and its end by a command.
 
-The server calls the steps later, with itself or its copy as an argument. This module does not know
-the words of commands.
+A start or an end has several steps. Each step is a function that the server calls later with itself
+as an argument, so a copy of the server can continue. This module does not know the words of
+commands.
 """
 
 from typing import TYPE_CHECKING

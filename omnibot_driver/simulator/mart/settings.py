@@ -32,8 +32,8 @@ class Quirks:
       limit.
     * ``echoes_distance``: TF and TB report the distance computed from time, not the driven
       distance.
-    * ``crashes_on_missing_numbers``: TIME, CS, MCS, SFR, SRR and SDR without a number end the
-      server.
+    * ``crashes_on_missing_numbers``: TIME, CS, MCS, SFR, SRR and SDR end the server if a number is
+      missing.
     * ``crashes_early``: VOLTS and all motions except F and B end a server that has just started.
     * ``empty_datagram_ends``: an empty datagram at the command port ends the server.
     * ``exit_is_silent``: EXIT is answered only if LOG was sent before.
@@ -45,8 +45,8 @@ class Quirks:
     * ``probe_turns``: MCR 0 runs the motors until the wheel moves; with a dead IMU, for 0.5 s.
     * ``heading_starts_off``: the first sample of RM adds half the turn rate times the time since
       the previous RM to the heading of RMRA.
-    * ``corrects_after_stop``: TF, TB, PTF, MCF and MCB may correct the heading in the sample of
-      their stop, and leave one motor on, usually with one unit.
+    * ``corrects_after_stop``: TF, TB, PTF, MCF and MCB may correct the heading even in the sample
+      in which they stop by themselves. This leaves one motor on, usually with one unit.
     """
 
     stop_port_keeps_motion: bool = False
@@ -86,8 +86,8 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks in the public source code: those of ``FIRMWARE``, except where the source code contradicts
-the running server."""
+"""Quirks in the public source code: those of ``FIRMWARE`` except one that the source code
+contradicts, and four that were found only in the source code."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {

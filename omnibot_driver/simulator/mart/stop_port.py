@@ -35,8 +35,9 @@ def obey(server: "MartServer", text: str) -> None:
 def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop a drive (F, B, RM) or a spin (R, L). Return whether the caller must wait for its end.
 
-    * Already stopping: nothing changes; True for a drive, False for a spin.
-    * A drive that the module ``alarms`` no longer watches: nothing is stopped; False.
+    * A motion that is already stopping is not stopped again. The result is True for a drive, and
+      False for a spin.
+    * A drive that the module ``alarms`` no longer watches is not stopped. The result is False.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

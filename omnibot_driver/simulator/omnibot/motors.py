@@ -103,7 +103,8 @@ class WheelController:
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    At the PWM limit, the integral term changes only away from it.
+    While the PWM is at its limit, the integral term changes only if this moves the PWM away from
+    the limit.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

@@ -176,7 +176,7 @@ class World:
     def _wander(self, slip: float, rim_m: float) -> float:
         """Return the wheel's slip, from 0 to 1, after its rim has moved by ``rim_m``.
 
-        ``slip``: the slip before. The standard deviation of the slip is half its mean.
+        ``slip``: the slip before this motion. The standard deviation of the slip is half its mean.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)

@@ -66,7 +66,7 @@ class Noise:
 def allan(readings: Column, period_s: float) -> Allan:
     """Return the Allan deviations of ``readings``, (n,), which are ``period_s`` seconds apart.
 
-    The averaging times grow by a quarter of an octave.
+    The averaging times grow by a quarter of an octave from one to the next.
     """
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS

@@ -2,8 +2,8 @@
 
 """Fit the robot's geometry to drives whose ends the user measured with a tape.
 
-Method: J. Borenstein and L. Feng, "UMBmark" (1995), for three wheels. This module does not know how
-the robot was driven.
+Method: J. Borenstein and L. Feng, "UMBmark" (1995), extended to three wheels. This module does not
+know how the robot was driven.
 """
 
 import math
@@ -81,7 +81,8 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
     ``drift``: standard deviation, in m, that slip causes in a wheel's distance of 1 m.
 
-    Raises ToolError if the fit fails, or if a radius is more than 20 % (``UNKNOWN``) off.
+    Raises ToolError if the fit fails, or if the mean wheel radius or the base radius differs from
+    the assumed one by more than 20 % (``UNKNOWN``).
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]

@@ -162,7 +162,10 @@ class Listener(Client):
             )
 
     def _lost(self) -> list[str]:
-        """Return the required topics without recent data, after reading the pending messages."""
+        """Return the required topics without recent data.
+
+        If a topic seems silent, the pending messages are read first.
+        """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):
             self._hear_pending()

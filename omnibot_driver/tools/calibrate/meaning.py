@@ -20,12 +20,13 @@ STANDS_PART: Final = 0.1
 """Largest fraction of the commanded speed at which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""Largest ratio of the speeds in the second and the first half of a drive at which the robot is
-regarded as stopping."""
+"""Largest ratio of the speed in the second half of a drive to that in the first half at which the
+robot is regarded as stopping."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """Limits for the speed of a drive with twice the command, divided by the speed of the first drive.
 
-``DOUBLED``: range of a doubled speed. ``UNCHANGED``: largest ratio of an unchanged speed.
+``DOUBLED``: range in which the speed is regarded as doubled. ``UNCHANGED``: largest value for which
+the speed is regarded as unchanged.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.

@@ -126,8 +126,8 @@ class Obedience:
 
         ``seconds``: time since the last call. ``measured``: velocity, in the units of ``command``.
 
-        Raises ToolError if the motion is less than a fifth of the commanded motion. Commands slower
-        than ``PLAIN`` are not checked.
+        Raises ToolError if the measured motion in an interval is less than a fifth of the commanded
+        motion. Commands slower than ``PLAIN`` are not checked.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

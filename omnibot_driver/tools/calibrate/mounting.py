@@ -2,7 +2,8 @@
 
 """Find the mounting of the IMU from gravity in three postures: level, front up, left side up.
 
-A turn to the left shows whether gyro and gravity agree. This module does not know the questions.
+A turn to the left shows whether gyro and gravity agree. This module does not know how the user is
+asked.
 """
 
 import math

@@ -2,10 +2,9 @@
 
 """``calibrate geometry`` and ``calibrate scale`` for a base that only drives straight and turns.
 
-* With the parameter ``metres_per_count``: finds it, ``linear_scale`` and ``motor_balance``.
-* Otherwise: finds the scales of the odometry.
-
-This module does not know the base's wheels.
+If the driver has the parameter ``metres_per_count``, the tool finds ``metres_per_count``,
+``linear_scale`` and ``motor_balance``; otherwise, the scales of the odometry. This module does not
+know the base's wheels.
 """
 
 import argparse
@@ -62,8 +61,8 @@ class Drive:
 class Ratio:
     """The motion in one drive, in m or rad, measured by the user and by the odometry.
 
-    * ``told``: motion by the odometry.
-    * ``true``, ``sigma``: motion by the user, and its standard deviation.
+    * ``told``: motion that the odometry measured.
+    * ``true``, ``sigma``: motion that the user measured, and its standard deviation.
     """
 
     drive: Drive

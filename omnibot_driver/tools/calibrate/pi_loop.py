@@ -86,8 +86,8 @@ def answer(
 
     * ``dead_s``: replaces the dead time of ``loop``.
     * ``begun``: initial position of the wheel between two encoder ticks, 0 to 1.
-    * ``sent_s``: time at which the board first sends its tick counts, and so notices ticks late;
-      None: never.
+    * ``sent_s``: time at which the board first sends its tick counts; while it sends, it notices
+      encoder ticks late. None: it never sends.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(

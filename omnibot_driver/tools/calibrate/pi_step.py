@@ -5,7 +5,7 @@
 1. Record steps with the current gains.
 2. Measure the levels of each encoder's signal at a constant duty.
 3. Fit each plant (motor with wheel) to starts at full duty.
-4. Repeat: compute gains, record steps, fit the dead time.
+4. In several rounds: compute gains, record steps, fit the dead time.
 """
 
 import argparse
@@ -42,9 +42,9 @@ WRITTEN_WITHIN_S: Final = 4.0
 times, because the board does not acknowledge settings."""
 
 QUIET_S: Final = 0.5
-"""Period, in s, with which the board sends its tick counts during a record, because it can miss
-encoder ticks while it sends. Not set if the user has set no period, which the tool could not
-restore."""
+"""Period, in s, with which the board sends its tick counts during a record. It is long, because the
+board can miss encoder ticks while it sends. If the user has set no period, the tool keeps the
+board's own period, which it could not restore."""
 RATE_SHOWN: Final = "Odometry rate (Hz)"
 """Name in /diagnostics of the rate at which the board sends its ticks: "measured of expected".
 

@@ -2,8 +2,8 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-The accelerometer's bias is found along gravity only; across it, a bias looks like a tilt. This
-module does not know how readings are recorded.
+Only the part of the accelerometer's bias along gravity is found; the part at right angles to
+gravity looks like a tilt. This module does not know how readings are recorded.
 """
 
 from collections.abc import Callable

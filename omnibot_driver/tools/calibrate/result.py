@@ -36,7 +36,7 @@ class Result:
     """The result of a calibration.
 
     * ``parameters``: values that the driver loads, by name.
-    * ``record``: further content of the calibration file.
+    * ``record``: further content of the calibration file, which the driver ignores.
     * ``notes``: sentences for the user.
     * ``draw``: draws the result into a figure of 9 by 6 inches.
     """

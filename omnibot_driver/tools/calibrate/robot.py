@@ -103,8 +103,8 @@ class Robot(Listener):
         Return the log.
 
         * ``obeys``: whether to raise an error if the robot does not move.
-        * ``monitored``: whether the driver's motion monitor stays on; off until speed and direction
-          are calibrated.
+        * ``monitored``: whether the driver's motion monitor stays on. It must be off until speed
+          and direction are calibrated.
         * ``show``: called with the seconds since the start of the motion.
 
         Raises ToolError on an e-stop, lost data, another node's command, a motion beyond the

@@ -77,10 +77,10 @@ def _record(
 def _to_and_fro(
     levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
 ) -> tuple[Law, float]:
-    """Return a control law that alternates between two speeds, and its duration in s.
+    """Return a control law that alternates a wheel between two speeds, and its duration in s.
 
-    The steps begin at different phases of the odometry deltas, which together show the whole
-    response.
+    The steps begin at different phases of the odometry deltas, so that the deltas of all steps
+    together show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

@@ -67,8 +67,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: returns the model's mean rates in deltas after a unit step, by their ends in
-        ticks.
+        ``mean``: returns the model's mean rate in each delta after a unit step. Its argument has
+        the end of each delta, in ticks after the unit step.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -101,7 +101,7 @@ class Fit:
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion: the better of two fits has the smaller value."""
+        """Akaike's information criterion: smaller for the better of two fits to the same steps."""
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
     def told(self, step: Step) -> Column:
@@ -234,7 +234,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with their onsets shifted so that the steps fit the model best.
 
-    A busy computer can delay a command, and so the true onset.
+    If a busy computer delays a command, the true onset is later than the computed one.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

@@ -17,7 +17,7 @@ QUANTUM_RADPS: Final = 0.05
 encoder and the protocol's unit of 0.1 mm."""
 MANY: Final = 1.5
 """Ratio of the residuals to the quantisation error above which the tool warns. Delayed commands
-double the residuals, and make the wheel's delay 4 ms too long."""
+double the residuals; the delay that the tool finds for the wheel is then 4 ms too long."""
 UNEXPLAINED: Final = 1.2
 """Ratio of the motor model's residual to the second-order model's, above which the motor model is
 regarded as wrong."""

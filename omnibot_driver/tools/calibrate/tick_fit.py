@@ -83,8 +83,8 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     """Fit a plant to records of starts from standstill, all at the same duty.
 
-    ``records``: times between ticks in s; the first one is not used. Raises ToolError if a record
-    is too short.
+    ``records``: times between ticks in s; the first time of each record is not used. Raises
+    ToolError if a record is too short.
     """
     # The first time of a record includes the standstill.
     intervals = [record[1:] for record in records]

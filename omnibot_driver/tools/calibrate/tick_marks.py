@@ -84,7 +84,7 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the number of the mark at which a record begins: ``row`` then matches ``steps`` best.
+    """Return the number of the mark at which a record begins: where ``row`` fits ``steps`` best.
 
     * ``row``: relative errors of the record's times between ticks.
     * ``steps``: relative errors of the distances from each mark to the next.

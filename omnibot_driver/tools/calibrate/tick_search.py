@@ -26,7 +26,8 @@ Column = NDArray[np.float64]
 SIGMA: Final = 0.1
 """Assumed relative noise of a time between ticks, until the encoder's marks are fitted."""
 SHARPEST: Final = 0.002
-"""Least assumed relative noise of a time between ticks. The board's unit is 0.1 ms."""
+"""Least assumed relative noise of a time between ticks. There is always some noise, because the
+board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
 """Longest allowed sum of both time constants, in s."""
@@ -34,7 +35,8 @@ GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
 """Starting values for the sum of both time constants, in s. There is one search for each value."""
 RATIOS: Final = (0.15, 0.4, 0.8)
-"""Starting values for the ratio of the fast to the slow time constant. At 1, a search stays."""
+"""Starting values for the ratio of the fast to the slow time constant. A search that starts at 1
+would stay there."""
 LATEST_S: Final = 2.0
 """Longest allowed time from the start of the wheel to its first tick, in s."""
 MOST_OFF: Final = 0.4
@@ -207,7 +209,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        The covariance follows from the residuals, and is increased if the records differ more.
+        The covariance follows from the residuals. It is increased if the results of the records
+        differ by more than the residuals predict.
         """
         own = 1 + self.order
         found = self._search(values)
