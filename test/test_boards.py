@@ -152,8 +152,8 @@ OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
     """The parameter descriptions say about an IMU only what is true for the board.
 
-    * The board subtracts the gyro bias itself: ``gyro_bias`` does not refer to
-      ``~/calibrate_gyro``.
+    * If the board subtracts its gyro bias itself, the description of ``gyro_bias`` does not say
+      that ``~/calibrate_gyro`` measures the bias.
     * Only the OmniBot's parameters quote the noise of an IMU.
     """
     profile = boards.load(name)

@@ -143,9 +143,9 @@ def test_a_late_zero_does_not_stop_a_velocity(monkeypatch: pytest.MonkeyPatch) -
 def test_a_zero_ends_no_goal_on_a_board_whose_switch_is_on_positional_control(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """On positional control, a zero on cmd_vel does not end a goal.
+    """Under positional control, a zero on cmd_vel does not end a goal.
 
-    The driver then refuses all commands on cmd_vel.
+    The driver refuses all commands on cmd_vel while the board is under positional control.
     """
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()

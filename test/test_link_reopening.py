@@ -137,7 +137,7 @@ def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(
 ) -> None:
     """If a lost port appears again while the driver ends, the driver sends Stop.
 
-    No data confirms rest, so the driver does not report it.
+    No data confirms that the robot is at rest, so the driver does not report a standstill.
     """
     end_patiently(monkeypatch)
     name = tmp_path / "omnibot"

@@ -211,7 +211,7 @@ WITHOUT_STAMP = (
 
 @pytest.mark.parametrize("value", WITHOUT_STAMP, ids=lambda value: type(value).__name__)
 def test_what_needs_no_stamp_does_not_wait_for_simulated_time(node: Node, value: object) -> None:
-    """Records and changes of state are passed on before the simulated clock has begun.
+    """The board's records and state changes are passed on before the simulated clock has begun.
 
     Otherwise, a press of the e-stop button, which is reported once, would be lost.
     """

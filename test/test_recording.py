@@ -75,7 +75,10 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """The topic of one line selects a robot; all lines of this robot are replayed."""
+    """The topic of one line selects a robot. All lines of this robot are replayed.
+
+    The bytes of each line reach the channel of this line.
+    """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
     assert recording.topics == (f"/b{RX}/two", f"/b{RX}/one")
@@ -141,7 +144,10 @@ def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
 def test_the_bag_of_another_board_names_the_missing_lines_and_the_board(
     tmp_path: Path, recorded: Sequence[str], channels: Sequence[str], query: str, needed: str
 ) -> None:
-    """If a bag is of another board, the message names the needed lines and those in the bag."""
+    """If a bag is of another board, the message names the needed lines and those in the bag.
+
+    The message also names the parameter ``board``.
+    """
     present = [RX + name for name in recorded]
     sent = "/omnibot_driver/raw_tx"
     path = bag(tmp_path / "bag", *present, *(sent + name for name in recorded))

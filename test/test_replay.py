@@ -165,7 +165,7 @@ def test_time_passes_as_it_did() -> None:
 def test_a_step_of_the_recorders_clock_is_not_waited_for(speed: float) -> None:
     """If the recorder's clock was set forward by 1000 days, the replay plays 10 s of the pause.
 
-    The stamps are those of the recording.
+    A notice reports the pause. The stamps are those of the recording.
     """
     step_s = 1000 * 86_400
     drive = simulated(400)

@@ -88,7 +88,7 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 def test_a_standstill_long_ago_is_forgotten() -> None:
     """A command that seems to come from a stall that ended 98 s ago is not refused.
 
-    The sender's clock must be wrong.
+    A command cannot be in transit for that time, so the sender's clock must be wrong.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
@@ -166,6 +166,6 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
     """The driver notices each stall that makes the guard process act.
 
-    Otherwise, the driver would send motion while the guard process sends stop bytes.
+    Otherwise, the driver would send motion commands while the guard process sends stop bytes.
     """
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

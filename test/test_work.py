@@ -74,7 +74,7 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """Run ``work`` for each tick of a running board, and return its mean numbers of Python calls.
+    """Count the Python calls of ``work`` for each tick of a running board; return the mean counts.
 
     The keys are the numbers of bytes that the board sends in a tick.
     """

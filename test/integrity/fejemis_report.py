@@ -34,7 +34,7 @@ SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""For each fault on lines with checksums: the least share of values to publish, and N.
+"""For each fault on lines with checksums: the least share of values that are published, and N.
 
 At most one value in N may be wrong. N = 0 means that no value may be wrong.
 """

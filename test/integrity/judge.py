@@ -15,13 +15,14 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-If the judge must skip more to find a frame that equals the decoded one, the match may be chance.
-The decoded frame is then wrong if the next one in the same read also needs too large a skip.
+If the judge must skip more to find a frame that equals the decoded one, the two may be equal by
+chance. The decoded frame is then wrong if the next one in the same read also needs too large a
+skip.
 """
 REACH_BYTES = 600
-"""Start of the search for the frames of a read: this number of received bytes before the read.
+"""Distance in received bytes from the start of the search for a read's frames to the read.
 
-From there, the search begins 300 bytes earlier in the true stream.
+In the true stream, the search starts another 300 bytes earlier.
 """
 
 

@@ -154,6 +154,8 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return "false letter" if it is false, else "".
 
+        A letter is false if the driver sent this byte as a part of a frame.
+
         ``at``: position of the letter in the write; negative if faults of the line have added or
         changed the letter.
         """

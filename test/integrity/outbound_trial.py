@@ -2,8 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board reports motion if the driver sends motion commands, or if the last received set-point is a
-motion. A change of state appears in the reports after one or two ticks.
+A running board reports motion if the driver sends motion commands, even if the line loses them, or
+if the last received set-point is a motion. A change of state appears in the reports after one or
+two ticks.
 """
 
 import math
@@ -34,9 +35,9 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
-* Key: the bytes held before, whether the line was idle, and the new bytes.
+* Key: the bytes that the receiver held before, whether the line was idle, and the new bytes.
 * Value: the bytes held afterwards, and the frames found, each with the position of its last byte.
-* ``None``: a letter was found; the new bytes must be processed one by one.
+* Value ``None``: a letter was found, so the new bytes must be processed one by one.
 """
 
 

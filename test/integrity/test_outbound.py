@@ -69,7 +69,7 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """The results of a short run of each scene are within the bounds of the outbound report.
+    """The results of a short run of a scene are within the bounds of the outbound report.
 
     Bounds on rates are not checked: the run has too few frames.
     """
@@ -87,7 +87,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """After a motion frame loses its last byte, the board obeys a wrong frame for under 1.5 ms."""
+    """If a motion frame loses its last byte, the board obeys a wrong frame for less than 1.5 ms."""
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
         number

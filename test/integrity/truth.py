@@ -2,8 +2,8 @@
 
 """Generator of true streams: the frames and bytes that a board sends, with arrival times in s.
 
-The layouts are the manual's, without code of the driver. The noise is that of an MPU6050 with its
-filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
+The layouts come from the manual, not from the driver's code. The noise is that of an MPU6050 with
+its filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
 """
 
 import math

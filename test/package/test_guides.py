@@ -145,7 +145,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
     """The commissioning guide's form lists all steps of the guide, and only parameters that exist.
 
-    The exception ``imu_rpy`` belongs to the robot's description.
+    The only exception is ``imu_rpy``, a parameter of the robot's description.
     """
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))

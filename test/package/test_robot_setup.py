@@ -50,7 +50,10 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """The udev rules of all four adapters make /dev/omnibot, with access for the group dialout."""
+    """The udev rules of all four adapters make /dev/omnibot, with access for the group dialout.
+
+    All but one of these rules are commented out.
+    """
     assert len(OFFERED) == 4
     for rule in OFFERED:
         assert rule["SUBSYSTEM"] == ("==", "tty")
@@ -104,7 +107,8 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
     """systemd ends the driver by SIGINT, as ctrl-C does.
 
-    After a crash of the driver, the guard ignores SIGINT and can still stop the robot.
+    After a crash of the driver, systemd sends SIGINT to the guard process, which ignores it and can
+    still stop the robot.
     """
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]
@@ -126,9 +130,9 @@ def test_systemd_accepts_the_unit() -> None:
 
 
 def test_the_first_process_of_a_container_outlives_the_guard() -> None:
-    """After a crash of the driver, the container's first process waits until the guard is done.
+    """After a crash of the driver, the container's first process lives longer than the guard.
 
-    The kernel would otherwise end the guard, which repeats Stop for a second.
+    When the first process ends, the kernel kills the guard, which must repeat Stop for a second.
     """
     (pause_s,) = re.findall(r"^time\.sleep\(([\d.]+)\)$", OUTLIVE.read_text(), re.MULTILINE)
     assert float(pause_s) > guard.TIMES * guard.PACE_S

@@ -2,7 +2,8 @@
 
 """Make the pictures of the README and the documents, except those that no program can make.
 
-``make pictures`` runs this program, which runs ``main(folder)`` of two modules at a time.
+``make pictures`` runs this program. It calls ``main(folder)`` of each module beside it, in a
+separate process, two at a time.
 """
 
 import os

@@ -2,8 +2,8 @@
 
 """Picture of squares of 5 m that a simulated LOIS ECU drives: the true path, and ``odom``'s path.
 
-There is one square to each side for each firmware variant. The program also prints ``odom``'s
-errors.
+With each firmware variant, the robot drives one square to the left and one to the right. The
+program also prints ``odom``'s errors.
 """
 
 import math

@@ -102,7 +102,10 @@ def test_the_boards_are_the_packages_beside_what_they_share() -> None:
 
 
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
-    """With one ``--link`` for a board with two lines, each line gets its own link."""
+    """With one ``--link`` for a board with two lines, each line gets its own link.
+
+    The program's hint on how to start the driver has the parameter of each port.
+    """
     with toy("toy_lines", "--link", str(tmp_path / "toy"), "--angle", "30") as process:
         printed = [line(process), line(process)]
         links = [tmp_path / "toy-drive", tmp_path / "toy-front"]

@@ -13,8 +13,8 @@ BATCH: Final = 5
 class InBatches(RunningBoard[B]):
     """A running board that waits for ``BATCH`` ticks, and then runs them at once.
 
-    A packet ends the wait early. The output of the ticks arrives together, as through a USB
-    adapter.
+    A packet from the host ends the wait early. The output of the ticks arrives together, as through
+    a USB adapter.
     """
 
     def _due(self, due_s: float) -> tuple[int, float]:

@@ -100,8 +100,8 @@ def shared_probe(
 ) -> Iterator[Probe]:
     """A probe of the shared driver, for one test.
 
-    The test begins at rest, with the e-stop released, and without earlier commands and output.
-    Afterwards, the e-stop is latched.
+    When the test begins, the robot is at rest, the e-stop is released, and no earlier commands and
+    output are stored. Afterwards, the e-stop is latched.
     """
     board, driver = shared
     probe = probe_of(driver)

@@ -171,7 +171,7 @@ def reap(statuses: dict[int, int]) -> None:
 def drive(arguments: list[str], environment: dict[str, str], before: str, output: int) -> NoReturn:
     """Run the driver in this forked process. End without the exit handlers of libraries.
 
-    LTTng's handler would stop a thread that does not exist in a forked process.
+    LTTng's handler would try to stop a thread that does not exist in a forked process.
     """
     from omnibot_driver import driver
 

@@ -2,8 +2,9 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. In Fast DDS, a process
-that was a client of such a server finds no nodes without one, so tests run this program.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. With Fast DDS, a
+process that was a client of a discovery server finds no nodes without a server. So tests run this
+program instead of becoming clients.
 """
 
 import sys

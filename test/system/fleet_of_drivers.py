@@ -2,9 +2,9 @@
 
 """Program that imports the driver once and runs several drivers, each in a separate process.
 
-``python fleet_of_drivers.py NUMBER PREFIX`` prints the process ids. The namespaces are
-``/PREFIX0``, ``/PREFIX1`` and so on; the port does not exist. The drivers end with the standard
-input.
+``python fleet_of_drivers.py NUMBER PREFIX`` prints the process ids of NUMBER drivers, which are
+in the namespaces ``/PREFIX0``, ``/PREFIX1`` and so on. Their port does not exist. The program ends
+the drivers when its standard input is closed.
 """
 
 import os

@@ -2,7 +2,8 @@
 
 """Profile of a board with few features: two wheels and ``cmd_vel``, but no IMU and no pause.
 
-A simulated OmniBot serves as the board.
+A simulated OmniBot serves as the board. The profile adds the topic ``heard`` and the service
+``~/ask``.
 """
 
 from collections.abc import Callable, Mapping

@@ -52,7 +52,8 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end of the tests.
 
-    Fast DDS has crashed when the end of a probe deleted the middleware's participant.
+    The node keeps the middleware's participant: Fast DDS has crashed when the end of a probe
+    deleted the participant.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)
@@ -170,7 +171,8 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again after some seconds, when a stall is over.
 
-        The driver then logs a second refusal, too: it logs each kind once in ``WARN_EVERY_S`` (s).
+        The driver then logs a second refusal, too: it logs each kind of refusal at most once in
+        ``WARN_EVERY_S`` (s).
         """
 
         def publish() -> None:

@@ -264,7 +264,9 @@ def test_setting_no_parameters_at_once_succeeds(start_driver: Start, probe_of: S
 def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
     start_driver: Start, probe_of: Start
 ) -> None:
-    """Unknown parameters, those of other boards and unknown types are refused with a reason.
+    """Unknown parameters, those of other boards and values of unknown types are refused.
+
+    The refusal gives a reason.
 
     Regression: a value of an unknown type raised an exception in rclpy, which ended the driver.
     """

@@ -54,7 +54,7 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received a motion command.
 
-    A press may be lost by a stall, or before the subscription is discovered.
+    A press may be lost in a stall, or before the subscription is discovered.
     """
     for _ in range(20):
         said.clear()
@@ -161,7 +161,7 @@ def test_the_space_bar_works_after_a_byte_that_is_no_key(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """When the user releases the key, the monitor stops the robot by some zero commands.
+    """When the user releases the key, the monitor stops the robot with some zero commands.
 
     The monitor sends one more zero command when it ends.
     """

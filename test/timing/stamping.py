@@ -132,7 +132,8 @@ def stamp(
     """Generate one stream and stamp its samples.
 
     ``loss``: share of lost bytes. ``skew``: relative error of the board's tick; positive if it is
-    too long. ``event``: key of ``EVENTS_S``. The host begins to read in the first second.
+    too long. ``event``: what happens in the middle of the stream, a key of ``EVENTS_S``. The host
+    begins to read at a random time in the first second.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = stream_of(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)

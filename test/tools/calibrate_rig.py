@@ -61,8 +61,8 @@ class Rig:
     def calibrate(self, *words: str, answer: Answer = yes, draws: bool = True) -> int:
         """Run a calibration in this process, and return its exit code.
 
-        ``draws``: whether to draw the picture, which takes a second. If the computer was too busy,
-        the calibration is repeated.
+        ``draws``: whether to draw the picture, which takes a second. A calibration that fails
+        because the computer was too busy is repeated.
         """
 
         def read(question: str) -> str:

@@ -44,7 +44,8 @@ def test_the_whole_walk_finds_what_was_planted(
 ) -> None:
     """The tool finds reversed axes, another delta frame and a turned IMU.
 
-    The user's first answer is impossible. A driver can load the calibration file.
+    The user's first answer is impossible, and the tool says so. A driver can load the calibration
+    file.
     """
     with rig(
         tmp_path,
@@ -78,7 +79,7 @@ def test_a_speed_limit_is_not_taken_for_positional_control(
 ) -> None:
     """The tool asks for a higher ``max_linear_speed`` if it is below a speed that the tool needs.
 
-    The robot would be slow, as if the board were under positional control.
+    At the limited speed, the tool could mistake the board for one under positional control.
     """
     with rig(tmp_path, {"max_linear_speed": 0.06}) as robot:
         assert robot.calibrate("commission", "--only", "board") == 1
@@ -126,9 +127,10 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """If an axis is reversed, the tool finds its sign, and notes a mirror image of the robot.
+    """If one axis is reversed, the tool finds the signs of all axes.
 
-    The answer "r" repeats the motion; an invalid answer repeats the question.
+    A note says that these signs describe a mirror image of the robot. The answer "r" repeats the
+    motion; an invalid answer repeats the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

@@ -105,7 +105,7 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """The tool reports a robot that moves with less than a fifth of the commanded velocity.
+    """The tool reports a robot that moves at less than a fifth of the commanded velocity.
 
     NaN is reported, too. Very slow commands are not checked.
     """

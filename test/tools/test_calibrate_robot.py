@@ -198,7 +198,7 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
     robot: Robot, rigged: Rig, late: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If ctrl-C comes before a motion, the tool switches the motion monitor on again.
+    """If ctrl-C comes before a motion, the motion monitor is on afterwards.
 
     No command was sent, so the message does not ask the user to cut the power.
     """

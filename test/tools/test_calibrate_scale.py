@@ -90,7 +90,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """The tool does not use a speed during which no commands are logged for a time.
+    """The tool discards the measurement of a speed in which the logged commands have a gap.
 
     The driver's command timeout may have stopped the robot.
     """
@@ -122,7 +122,7 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """The tool reports an error if no speed is steady, or if a speed is against its command."""
+    """The tool reports an error if no speed is steady, or if a speed is opposite to its command."""
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):

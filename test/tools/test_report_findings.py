@@ -275,9 +275,9 @@ def test_the_imu_of_another_robot_is_not_expected(
 ) -> None:
     """The finding about missing IMU messages depends on which of two robots have an IMU.
 
-    * Both robots, or the topics show an IMU: BAD.
-    * One of the two: NOTE.
-    * None: no finding.
+    * Both have an IMU, or a topic of this robot is for an IMU: BAD.
+    * Only one has an IMU, and no topic shows which: NOTE.
+    * Neither has an IMU: no finding.
     """
     drive.imu.drop(0.0, 99.0)
     for alone in (False, True):

@@ -110,7 +110,8 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 ) -> None:
     """A port makes a real terminal, but not a pseudo-terminal, exclusive until the port is closed.
 
-    Only root can then open the terminal, with or without locks.
+    While the terminal is exclusive, only root can open it again. This also keeps out programs that
+    use no locks.
     """
 
     def exclusive() -> bool:

@@ -150,7 +150,8 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
     """If the board's thread fails, a read and the close raise RuntimeError.
 
-    The error of the read has the cause, and is not that of a lost line.
+    The error of the read has the thread's exception as its cause. It is not the error of a lost
+    line.
     """
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:

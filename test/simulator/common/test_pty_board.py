@@ -58,7 +58,7 @@ def all_of(port: int) -> Iterator[bytes]:
 
 @pytest.mark.slow
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """If no program reads the terminal, it keeps the oldest bytes; later bytes are counted.
+    """A terminal that no program reads keeps the oldest bytes; later ones are dropped and counted.
 
     The test allows twice ``UNREAD_LIMIT``, because a busy kernel counts bytes late.
     """
@@ -194,7 +194,7 @@ def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "link to a file"])
 def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
-    """The simulator never replaces a file, or a link to a file, by its own link.
+    """The simulator never replaces a file, or a link to a file, with its own link.
 
     The error says what to do, and no file descriptor stays open.
     """

@@ -80,6 +80,8 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
     """If one of the requested symbolic links cannot be made, the program makes none of them.
 
+    The three cases are:
+
     * The board has fewer serial ports than links.
     * A file already has the name of a link.
     * The board has only a UDP port.

@@ -9,9 +9,9 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """``brush`` switches the brush. ``motv`` moves the lift for a time, or until ``motv`` with 0 V.
+    """``brush`` switches the brush. ``motv`` drives the lift with a voltage for a time.
 
-    At 6 V, the lift takes 12 s from end to end.
+    ``motv`` with 0 V stops the lift earlier. At 6 V, the lift takes 12 s from end to end.
     """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")
@@ -114,7 +114,7 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """After a gyro calibration, ``eer`` or ``setid 0`` removes the offset, so the yaw drifts."""
+    """After a gyro calibration, ``eer`` or ``setid 0`` replaces the offset, so the yaw drifts."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)

@@ -43,7 +43,10 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 
 
 def velocity_may_be_nan(quirks: Quirks) -> bool:
-    """Return whether some velocities that are reported in a straight drive are not finite."""
+    """Return whether some velocities that are reported in a straight drive are not finite.
+
+    With this quirk, two ticks in one count of the timer make the board divide by zero.
+    """
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60), SetDuty(60, 60))
     rig.run(3.0)

@@ -241,7 +241,7 @@ def test_the_gps_moves_with_the_robot() -> None:
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
     """A reboot makes the board silent for 2 s, and resets everything but the robot's true pose.
 
-    Without its low-pass filter, the board obeys no speed command.
+    Until the low-pass filter is set again, the board obeys no speed command.
     """
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)

@@ -203,7 +203,7 @@ def test_cs_5_minus_5_turns_left() -> None:
     ],
 )
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
-    """A speed change (CS or RMCS) stops a motor, but does not reverse it.
+    """A speed change (CS or RMCS) that would reverse a motor stops the motor instead.
 
     If one motor would exceed full speed, the other motor becomes slower instead.
     """
@@ -337,7 +337,8 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
     """A backward drive (B) ends if the rear sonar measures less than 15 inches.
 
-    The robot moves 2 inches before the first measurement.
+    The robot moves 2 inches before the first measurement, so an obstacle that is 15.5 inches behind
+    at the start ends the drive, too.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)

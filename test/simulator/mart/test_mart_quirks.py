@@ -25,7 +25,7 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether a drive (F) that SL has stopped on the stop port counts as in progress.
+    """Return whether a drive (F) stopped by SL on the stop port still counts as in progress.
 
     The server then refuses other motions, and the stop SM hangs the command port.
     """

@@ -174,7 +174,7 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 def test_a_sonar_measures_three_times_what_is_near() -> None:
     """A sonar measures three times if an obstacle is near, so its reply comes later.
 
-    The rear sonar's limit is 15 inches.
+    Here, only the front obstacle is near: the limit is 19 inches in front and 15 inches behind.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"

@@ -98,7 +98,7 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """R resets the board's odometry and sequence numbers, but not the true pose of the robot.
+    """R reboots the board: odometry and sequence numbers become 0, but the true pose is unchanged.
 
     The host must wake the board again.
     """
@@ -197,7 +197,7 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
     """A receiver that looks for idle gaps discards an incomplete frame after a gap.
 
-    The gap comes from the arrival times of the bytes or, without these, from the ticks.
+    The board measures the gap by the arrival times of the bytes or, if there are none, in ticks.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

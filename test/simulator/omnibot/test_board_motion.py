@@ -162,7 +162,7 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """With the switch on "position", zeros in mode 1 command a drive to the origin.
+    """With the switch on "position", zeros in a frame of mode 1 command a drive to the origin.
 
     The stop frame has mode 2, and stops the robot.
     """

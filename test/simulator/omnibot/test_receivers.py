@@ -143,7 +143,7 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A counting receiver completes a stop frame that lacks a byte by the next frame's first FF.
+    """A counting receiver completes a stop frame that lacks a byte with the FF of the next frame.
 
     So wheel C turns at 255 LSB.
     """
@@ -244,7 +244,7 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """Some receivers count bytes from the time of the boot among the three that wake the board."""
+    """Some receivers count bytes during the boot among the three that wake the board."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()

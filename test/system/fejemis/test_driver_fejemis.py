@@ -265,7 +265,8 @@ def test_power_off_is_refused_while_driving(
 ) -> None:
     """The driver refuses ``~/power_off`` during a drive. At rest, the power goes off after a delay.
 
-    On a busy computer, the robot may rest too early; the test then cancels by ``~/start``.
+    On a busy computer, the robot may already be at rest at the first call. The test then cancels
+    the power-off by ``~/start``, and tries again.
     """
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))

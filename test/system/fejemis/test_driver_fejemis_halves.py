@@ -30,7 +30,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 ) -> None:
     """If a Teensy is unplugged during a drive, the driver stops the motors of the other Teensy.
 
-    When the first Teensy is back, the driver stops its motors, too.
+    When the unplugged Teensy is back, the driver stops the motors of this Teensy, too.
     """
     said = len(driver.lines)
     assert probe.call(SetBool, "brush", data=True).success

@@ -49,7 +49,7 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """The policy lets other enclaves use only what the driver has, and the topics of every node.
+    """Other enclaves may use only topics and services of the driver, and topics that all nodes use.
 
     Only the operator may call services and publish lift commands.
     """

@@ -22,9 +22,9 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets that a recording needs from each Teensy, so that a replay recognises it.
+"""Number of packets from each Teensy that a replay needs to recognise the Teensy.
 
-The answers to the driver's first questions are not needed.
+The recording may lack the answers to the driver's first questions.
 """
 
 

@@ -29,7 +29,7 @@ NODE: Final = "omnibot_driver"
 
 
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """The services switch the LED, and send the ball command exactly once.
+    """A service switches the LED on and off. Another sends the ball command exactly once.
 
     The board may miss the command, but a repetition could drop a second ball.
     """
@@ -49,7 +49,8 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 ) -> None:
     """If the compass shows east and the declination is 0.1 rad, the published heading is -0.1 rad.
 
-    In the ENU frame, east is 0 and left is positive.
+    In the ENU frame, east is 0 and left is positive. Magnetic east is 0.1 rad to the right of true
+    east.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(

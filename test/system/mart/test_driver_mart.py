@@ -310,7 +310,7 @@ def test_a_driver_that_hangs_is_guarded(new: New) -> None:
 def test_its_services_answer(new: New, tmp_path: Path) -> None:
     """The services calibrate the gyro, start the log, and download the last move and the log.
 
-    A file of the same name is kept. The download of the log ends the MART server.
+    An existing file of the same name is kept. The download of the log ends the MART server.
     """
     mart, _driver, probe = new
     with driven(probe, mart, 0.3, 0.0):
@@ -337,7 +337,7 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 ) -> None:
     """New values of ``range_maximum`` and ``dock_distance`` take effect while the driver runs.
 
-    The driver requests 2 inches for 0.1 m: the robot may drive 1.6 times as far.
+    For 0.1 m (3.9 inches), the driver requests 2 inches: the robot may drive 1.6 times as far.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)

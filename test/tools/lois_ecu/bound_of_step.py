@@ -7,7 +7,8 @@ Run this by hand:
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
 The robots are random, as in ``judge_step.py``. A *mark* is a place on the encoder's disc at which
-the board counts a tick. For each kind of noise, load and rate change by 0.5 % between records:
+the board counts a tick. The load and the rate change by 0.5 % between records. The kinds of noise
+are:
 
 - "each time": every time between ticks has an independent error of 10 %.
 - "other marks": the marks are displaced by 10 %, differently in each turn.

@@ -144,7 +144,7 @@ def test_records_that_are_too_short_are_refused() -> None:
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
     """If short and long ticks alternate, the tool finds a correction factor for each kind.
 
-    The board has missed some edges.
+    In this test, the board has missed some edges.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -290,7 +290,8 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
     """The tool refuses a record in which every time is the largest number that the record can hold.
 
-    The true times may be longer: in the manual's unit of 100 ns, the number means 6.6 ms.
+    The true times may be longer: in the manual's unit of 100 ns, the number means 6.6 ms, and the
+    usual times between ticks are longer.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"

@@ -64,7 +64,7 @@ def test_a_robot_is_calibrated_from_its_records(
 def test_a_limit_that_reduces_the_full_duty_is_named(
     tmp_path: Path, limit: str, value: float
 ) -> None:
-    """The tool ends with an error if a parameter of the driver reduces the full duty.
+    """If a parameter of the driver reduces the full duty, the tool's error names the parameter.
 
     Otherwise, the measured gain and dead zone would be wrong.
     """
