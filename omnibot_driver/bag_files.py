@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Opens rosbag2 bags, also those of a recorder that was killed.
+"""Opens a bag in rosbag2 format, a folder or one file, even if its recorder was killed.
 
-This module knows files and messages; it does not know the content of a message.
+This module does not know the content of a message.
 """
 
 from collections.abc import Collection, Iterator

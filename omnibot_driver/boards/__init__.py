@@ -2,8 +2,8 @@
 
 """The boards that the driver supports.
 
-The parameter ``board`` selects a profile, the module of one board. Other modules outside the core
-must work with any board.
+Each board has a profile, a module that is imported only if the parameter ``board`` selects it. All
+other modules outside the core must work with any board.
 """
 
 from collections.abc import Callable, Mapping
@@ -57,10 +57,10 @@ class Profile(Protocol):
         """Return the kinematics of the wheels, from checked parameter values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Create the board's own topics and services; return a publishing function for each own
-        reading.
+        """Create the board's own topics and services, and return its publishing functions.
 
-        Called on the executor's thread, before any bytes arrive.
+        There is one function for each type of reading that only this board has. Called once, on the
+        executor's thread, before any bytes arrive.
         """
 
 
@@ -95,7 +95,8 @@ def table_for(given: Mapping[str, object]) -> Table:
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     """Return the values of all parameters of the board that ``given`` names.
 
-    Raises ParameterError for a wrong value, or for a parameter that this board does not have.
+    A parameter that is not in ``given`` has its default value. Raises ParameterError for a wrong
+    value, or for a parameter that this board does not have.
     """
     table = table_for(given)
     for name in given:

@@ -2,7 +2,7 @@
 
 """The parameters that only a Fejemis has. This module must not use ROS.
 
-Values that the boards store are unset by default; the driver then does not write them.
+A parameter whose value the boards store is unset by default; the driver then writes no value.
 """
 
 import math

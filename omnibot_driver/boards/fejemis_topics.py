@@ -39,7 +39,7 @@ WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
 """Shortest time between two published steering angles, in ns.
 
-The board sends 66 angles per second; earlier angles are not published.
+The board sends 66 angles per second; an angle that comes earlier is not published.
 """
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")

@@ -2,7 +2,7 @@
 
 """The LOIS ECU's own parameters. This module does not use ROS.
 
-Values that the board stores are unset by default; the driver then does not write them.
+A parameter whose value the board stores is unset by default; the driver then writes no value.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz. The board then forwards each command to a
-sensor; the compass' line carries at most 34 commands a second.
+"""Largest rate of commands in a terminal mode, in Hz. In such a mode, the board forwards each
+command to a sensor; the compass' line carries at most 34 commands a second.
 """
 
 WHEELS: Final = (
@@ -267,7 +267,7 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the command rate would delay Stop in a terminal mode.
 
-    The board then forwards each Stop to a sensor at 4800 or 9600 baud.
+    In such a mode, the board forwards each Stop to a sensor at 4800 or 9600 baud.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(

@@ -26,7 +26,8 @@ Row = tuple[object, ...]
 def table(reading: RecordReading) -> Iterator[Row]:
     """Yield the header of the file, then one row for each sample.
 
-    Headings are in degrees, clockwise from magnetic north. Unknown values are empty.
+    Headings are in degrees, clockwise from magnetic north. The scale of the torques is unknown.
+    Unknown values are empty.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:

@@ -87,8 +87,8 @@ class LoisEcuTopics:
     def _make_what_the_modes_need(self) -> None:
         """Create and remove topics for the parameters ``drive_mode`` and ``terminal_mode``.
 
-        ``duty_cmd`` exists only in duty mode; ``~/terminal`` stays after its first use. Call this
-        method on the executor's thread.
+        ``duty_cmd`` exists only in duty mode. ``~/terminal`` is created in a terminal mode, and
+        then stays. Call this method on the executor's thread.
         """
         duty, terminal = (
             self._values["drive_mode"] == "duty",

@@ -2,7 +2,8 @@
 
 """Decides when the command TIME may set the controller's clock.
 
-If TIME sets the clock back between two motions, the controller computes a wrong heading.
+TIME sets the clock to a full minute, and ignores the seconds, so it can set the clock back. If this
+happens between two motions, the controller computes a wrong heading.
 """
 
 import time

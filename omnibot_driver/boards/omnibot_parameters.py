@@ -139,9 +139,10 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if the axis signs do not permit goal poses.
+    """Raise ParameterError if goal poses are used, but the axis signs do not permit them.
 
-    The sign of yaw must be the product of the other signs; otherwise the board's axes are mirrored.
+    The sign of yaw must be the product of the signs of x and y; otherwise, the board's axes are a
+    mirror image of the robot's axes.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

@@ -2,5 +2,5 @@
 
 """The core of the driver: it converts bytes and times into values.
 
-It has no input or output, and uses no ROS, threads or clocks.
+It does no input or output, and uses no ROS, threads or clocks.
 """

@@ -88,8 +88,8 @@ class ReadingClock(Protocol):
 class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
-    Implement each method that has only a docstring. Requests such as ``pause`` may raise
-    RequestRefused.
+    Implement each method that has only a docstring. Requests such as ``pause`` raise RequestRefused
+    if the present mode forbids them.
     """
 
     traits: Traits
@@ -175,7 +175,7 @@ class Board(Protocol):
     def discard(self) -> None:
         """Discard incomplete data, because a long silence has followed.
 
-        If later bytes completed such a reading, the reading would get a wrong arrival time.
+        Otherwise, later bytes could complete a reading, which would get a wrong arrival time.
         """
         return
 
@@ -286,7 +286,8 @@ class Board(Protocol):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the guard's packets for a hang of this process: without and with a latched e-stop.
 
-        The first item contains Stop; the second contains the emergency stop, then Stop.
+        The first item contains Stop; the second contains the emergency stop, then Stop. The driver
+        calls this method after each input and before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

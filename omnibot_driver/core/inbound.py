@@ -125,8 +125,8 @@ class Inbound:
 def _show_life(readings: Sequence[Reading]) -> bool:
     """Return whether readings that came without new bytes show that the board is alive.
 
-    OdometryReadings, NoticeReadings and results of requests do not: they can follow from elapsed
-    time alone.
+    OdometryReadings, NoticeReadings and results of requests do not show this: they can follow from
+    elapsed time alone.
     """
     for reading in readings:
         content = reading.content if isinstance(reading, ExtraReading) else reading

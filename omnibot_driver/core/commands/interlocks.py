@@ -2,7 +2,8 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method ``why_not_…`` returns the reason for a refusal, with a remedy; empty if there is none.
+Each method ``why_not_…`` returns the reason for a refusal, with a remedy; empty if nothing is
+refused.
 """
 
 from typing import Final

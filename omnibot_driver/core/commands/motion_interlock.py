@@ -10,8 +10,8 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Two stops within this time, in s, are assumed to have the same cause. The user must then act
-before motion is accepted again.
+"""Two stops within this time, in s, are assumed to have the same cause. After the second stop, the
+user must act before motion is accepted again.
 """
 
 
@@ -57,8 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        If the board has no ~/start, the release ends the refusal after the monitor's second stop.
-        Otherwise, it changes nothing.
+        If the board has no ~/start, the release ends the refusal after the monitor's second stop
+        within 60 s. In all other cases, it changes nothing.
         """
         if self.until is Until.ESTOP:
             self.start()

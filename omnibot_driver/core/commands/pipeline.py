@@ -200,7 +200,7 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion comes from the newest estimate, or from ``reading`` if that estimate has none.
+        The motion comes from the newest estimate if it contains one, otherwise from ``reading``.
         """
         if not reading.possible:
             return self._monitor.count_impossible(now)
@@ -255,7 +255,8 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only the loss of a goal gives a notice: the next velocity command is refused with a notice.
+        Only the loss of a goal gives a notice. Velocity commands come repeatedly, so the refusal of
+        the next one gives a notice.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
@@ -286,7 +287,7 @@ class CommandPipeline:
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 
-        A change of the odometry frame makes a goal invalid.
+        A change of the odometry frame's origin or scale makes a goal invalid.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):

@@ -2,7 +2,7 @@
 
 """The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-A board continues the last motion until it receives Stop.
+A board continues the last motion until it receives Stop, so Stop is sent when a command expires.
 """
 
 import math

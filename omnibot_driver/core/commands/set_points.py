@@ -21,8 +21,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: a robot drives away from its goal if the distance or the angle to
-it grows by more, in m or rad. The overshoot of a controller is smaller.
+"""``LEAVING_M``, ``LEAVING_RAD``: limits in m and rad. If the distance or the angle to the goal
+grows by more than its limit, the robot drives away from the goal. The overshoot of a controller is
+smaller.
 """
 
 
@@ -68,8 +69,8 @@ class BaseSetpoint:
 
     * The attribute ``is_zero``: whether the command is a standstill.
     * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
-    * ``before``: previous set-point. The ramp starts at its velocity; at rest if it is not a body
-      velocity.
+    * ``before``: previous set-point. The ramp starts at the velocity that this set-point has
+      reached; at rest if the set-point is not a body velocity.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 

@@ -2,8 +2,8 @@
 
 """Sends the motion lines (``rc``) to both boards, and repeats them.
 
-If the front wheel's angle limits the speed, or without checksums, they are also repeated after each
-new angle.
+The lines are also repeated after each new angle of the front wheel, if this angle limits the speed
+or if the lines have no checksum.
 """
 
 import math

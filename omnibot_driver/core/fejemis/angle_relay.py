@@ -23,8 +23,8 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit in degrees for a misread angle.
 
-If an angle loses its minus sign unnoticed, the board turns to the wrong side. The driver keeps such
-an angle below this limit.
+If an angle loses its minus sign unnoticed, the board turns to the wrong side. The driver writes
+each angle so that the misread angle is below this limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -52,7 +52,7 @@ class AngleRelay:
 def heard_instead(text: str) -> Iterator[float]:
     """Yield each number that a board may read if two characters of ``text`` are lost unnoticed.
 
-    The number is 0 if the other characters form none.
+    The number is 0 if the remaining characters form none.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:

@@ -173,7 +173,8 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The stall is not regarded as silence of the boards.
+        The guard may have switched them off already. The stall is not regarded as silence of the
+        boards.
         """
         self._inbound.watch.stalled()
         for half in self._ports.halves:

@@ -39,8 +39,8 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: with the setting auto: whether the last line, except heartbeats, contradicts
-      ``sums``.
+    * ``doubtful``: with the setting auto: whether the last line that is not a heartbeat contradicts
+      ``sums``. The driver's lines to the board then carry no checksum.
     * ``contradicted``: whether the last line contradicts the user's setting ``line_sums``.
     """
 

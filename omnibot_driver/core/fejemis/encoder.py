@@ -81,8 +81,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        * With a limited speed: each new angle changes the limit.
-        * Without checksums: a damaged line is soon replaced.
+        * If the angle limits the speed, because each new angle changes the limit.
+        * If the lines have no checksums, so that a damaged line is soon replaced.
         """
         return self.held or not self._pair.with_sums
 

@@ -2,7 +2,8 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A line in another form is rejected, but three equal forms in a row are learnt.
+A line in another form is rejected. If three such lines in a row have the same form, the third is
+accepted, and its form is learnt.
 """
 
 from typing import Final
@@ -10,8 +11,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: if as many of 24 lines of one kind lack the learnt form, the
-form is no longer checked. For lines with and without a correct checksum.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum. If so
+many of 24 lines of one kind lack the learnt form, the form is no longer checked.
 """
 OF: Final = 24
 

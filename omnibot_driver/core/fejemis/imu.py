@@ -112,8 +112,9 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Update the phase: the latest with which no recent sample arrives before its sampling
-        time.
+        """Update the phase of the sampling times after a new sample.
+
+        The new phase is the latest with which no recent sample arrives before its sampling time.
 
         ``delay_s``: time in s from the new sample's sampling, by the old phase, to its arrival.
         """

@@ -23,8 +23,8 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""Time in s between the two lines of a pair from which the pair may be false. Such a pair must wait
-for the next pose.
+"""If the two lines of a pair are this time in s or more apart, the pair may be false, so it must
+wait for the next pose.
 """
 SILENT_S: Final = 0.1
 """Longest usual time, in s, without gyro and acceleration lines.
@@ -109,7 +109,8 @@ class ImuPairs:
         self._skipped = 0
         self._silent = False
         """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines.
-        New pairs are then doubtful until the next pose, or until ``take`` rejects a pair.
+        New pairs are then doubtful until the next pose, or until ``take`` rejects a pair because no
+        pose comes.
         """
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
@@ -148,8 +149,8 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all waiting pairs.
 
-        Pairs are rejected if gyro and acceleration lines are missing since the previous pose, or if
-        the time since then is unknown.
+        Pairs are rejected if both gyro and acceleration lines are missing since the previous pose,
+        or if the time since then is unknown.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S

@@ -2,8 +2,8 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Lines are repeated, because the board does not acknowledge them. A line that moves the lift is sent
-once, because it limits the run time.
+Lines are repeated, because the board does not acknowledge them. Exception: the line of a lift
+command, even of 0 V, is sent once, because each line that moves the lift limits its run time.
 """
 
 import math

@@ -150,10 +150,11 @@ class WheelConfiguration:
 
 @value(frozen=True, slots=True)
 class SteeringConfiguration:
-    """``confs``: track and distance from the axle to the steered wheel, in m, as in the line.
+    """``confs``: the track, and the distance from the axle to the steered wheel, in m.
 
-    The track is second by the boards' help text, but first on some boards. ``digits``: for each
-    number, the unit of its last digit in the line; empty if unknown.
+    The numbers are in the order of the line. The boards' help text says that the track is second,
+    but some boards report it first. ``digits``: for each number, the unit of its last digit in the
+    line; empty if unknown.
     """
 
     first_m: float

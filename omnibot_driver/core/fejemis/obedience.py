@@ -2,7 +2,8 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-After an e-stop, the driver sends ``start`` by itself; after a pause, only at the user's request.
+When an e-stop is released, the driver sends ``start`` by itself; after a pause, only at the user's
+request.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-A repeated notice that stops the robot has an empty text.
+A notice that stops the robot is passed on each time, but a repeated one has an empty text.
 """
 
 import math

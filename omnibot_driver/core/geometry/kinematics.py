@@ -2,7 +2,8 @@
 
 """The interface that every arrangement of wheels offers to the driver.
 
-Axes are REP-103's; wheel rates are in rad/s. The methods also convert small displacements.
+Axes are REP-103's. Wheel rates are in rad/s, in the order of ``joints``. The methods also convert
+small displacements.
 """
 
 from collections.abc import Sequence

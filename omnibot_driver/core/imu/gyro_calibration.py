@@ -2,7 +2,7 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-Without displacements, a steady turn looks like rest, so a large bias is rejected.
+Without displacements, a steady turn looks like rest, so a large bias is always rejected.
 """
 
 import math

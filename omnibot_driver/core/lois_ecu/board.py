@@ -45,8 +45,8 @@ RESET_AGAIN_S: Final = 1.1
 reports arrive.
 """
 STEADY_S: Final = 0.3
-"""Time in s without a change of the tick counts after which the wheels are regarded as at rest;
-shorter than the report period after a boot, 0.4 s.
+"""Time in s without a change of the tick counts after which the wheels are regarded as at rest.
+After a boot, the report period is 0.4 s, so one unchanged report is enough.
 """
 
 

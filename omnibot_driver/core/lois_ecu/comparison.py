@@ -2,7 +2,8 @@
 
 """Correction of the motion filter by the board's reports.
 
-While the board does not count a wheel's ticks, the board's odometry (0x20) corrects the filter.
+While the board counts a wheel's ticks, the count corrects the filter; otherwise, the board's
+odometry (0x20) does.
 """
 
 import math
@@ -48,13 +49,13 @@ UNFORESEEN: Final = 5.0
 a wheel cannot explain. Such a difference may be a sign of a restart of the board.
 """
 SAME_TICKS: Final = 0.6
-"""Difference, in ticks, from the expected count, from which an unchanged count corrects the filter.
-Below it, the next tick may not be due yet.
+"""An unchanged count corrects the filter only if the expected count differs from it by at least
+this number of ticks. Otherwise, the next tick may not be due yet.
 """
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a report whose heading differs
-from the expected one by more than both is ignored.
+"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a reported heading that differs
+from the expected one by more than both is ignored. It comes from an outdated wheel speed.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0

@@ -40,7 +40,8 @@ class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
     * ``sum_required``: whether to discard all lines without a checksum. If False, they are
-      discarded only while the board sends checksums.
+      discarded only while the board sends checksums, because a line that loses two characters looks
+      like a line without a checksum.
     * ``terminal``: whether text outside the protocol is regarded as a sensor's line, not as damage.
     * ``times``: for each report of the last call, the arrival time of its last line, in s.
     """

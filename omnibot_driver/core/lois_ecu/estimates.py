@@ -29,7 +29,8 @@ class Estimates:
     """The estimates of one robot. Pairs of values are for the left and the right wheel.
 
     * ``pose``: pose of the last estimate.
-    * ``heading_compared``: whether the board's odometry has corrected the heading since then.
+    * ``heading_compared``: whether the board's odometry has corrected the heading since the last
+      estimate.
     * ``late_stddev_s``: standard deviation of the timestamps.
     """
 

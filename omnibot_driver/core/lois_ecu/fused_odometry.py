@@ -24,8 +24,8 @@ class FusedOdometry:
     * ``pose``, ``covariance``: in the odometry frame.
     * ``twist``: in the body frame.
     * ``twist_covariance``: variances in (m/s)² and (rad/s)².
-    * ``displacement``: since the previous estimate, in the robot's axes at that time.
-    * ``wheel_ways_m``: distances of both wheels since the previous estimate.
+    * ``displacement``: motion since the previous estimate, in the robot's axes at that time.
+    * ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate.
     """
 
     stamp_s: float

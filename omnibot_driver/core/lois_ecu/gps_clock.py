@@ -29,7 +29,7 @@ class GpsClock:
         return self._date is not None
 
     def set_date(self, date: GpsDate) -> None:
-        """Use a reported date, unless it is zero or from 2038 on; otherwise, the date is unknown.
+        """Use a reported date; if it is zero or from 2038 on, the date becomes unknown.
 
         Without a date, the receiver sends zeros or a false year.
         """

@@ -85,7 +85,8 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether several reports arrived together after a gap of more than ``LATE_S``.
+        * ``late``: whether this report and later tick reports arrived together, after a gap of more
+          than ``LATE_S``.
         * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s

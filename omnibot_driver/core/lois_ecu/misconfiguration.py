@@ -25,8 +25,8 @@ OWN_GAINS: Final = (
     " 0.04 m on average, by at most 0.16 m in nearly all drives, and by 2.2 m in one of 150. Run"
     " `calibrate step`, or set these parameters"
 )
-"""Advice if the user has not set all gains; the braces stand for their names. The errors were
-measured in 150 forward drives with the public firmware.
+"""Advice if the user has not set all gains; the braces stand for the names of the missing gains.
+The errors were measured in 150 forward drives with a build of the public firmware.
 """
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (

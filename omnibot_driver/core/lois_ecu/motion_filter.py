@@ -57,7 +57,8 @@ EXCESS_CHANGE: Final = (0.0, 0.15)
 """Standard deviation that is added to a wheel's excess when its set-point changes.
 
 The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
-First value: for the board's own controller gains. Second value: for the user's.
+``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess. The first values are
+for the board's own controller gains, the second ones for the user's.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLS_S: Final = 0.1
@@ -91,7 +92,7 @@ class MotionFilter:
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
         """Smallest expected difference between the two measured wheel speeds, in m/s, since the
-        last comparison of the board's distance.
+        board's distance was last compared with the estimated one.
 
         While both speeds are equal, the public firmware does not update its position.
         """
@@ -280,8 +281,7 @@ class MotionFilter:
         return course.kind if course.kind == "rpm" or driven else "stop"
 
     def _begin_biases(self, wheels: Sequence[int]) -> None:
-        """Reset the speed errors (biases) of these wheels, because the kind of their command has
-        changed.
+        """Reset the speed errors (biases) of these wheels, whose kind of command has changed.
 
         A bias is a relative error in duty mode, otherwise the amount in m/s by which the firmware
         rounds down a speed.
