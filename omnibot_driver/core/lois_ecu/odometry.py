@@ -26,17 +26,17 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The driver predicts the pose for this number of tick report periods after the last report of any
-kind, but for at least ``UNHEARD_S`` seconds."""
+"""How long the driver predicts the pose after the last tick or odometry report:
+``UNHEARD_GROUPS`` periods of the tick reports, but at least ``UNHEARD_S`` seconds."""
 LOST_REPORTS_S: Final = 1.2
-"""Longest silence of the board, in s, that lost reports alone explain, if no set-point changed in
-it. The driver then assumes that the wheels followed their set-points."""
+"""Limit in s for a silence of the board. If it was shorter, and no set-point changed meanwhile, the
+driver assumes that only reports were lost, and that the wheels followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
-"""Largest tick count, in turns of the wheel, that can show a restart of the board at rest. A larger
-count may come from a push. The limit is at least one tick."""
+"""Largest tick count, in turns of the wheel, that can show a restart of the board while the robot
+is at rest. A larger count may come from a push. The limit is at least one tick."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -146,8 +146,8 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether a restart of the board is the only explanation for counts near zero.
 
-        The counts must contradict the predicted motion. At rest, they must also be at most
-        ``NUDGED_TURNS``.
+        The counts must contradict the predicted motion. If the robot is at rest, they must also be
+        at most ``NUDGED_TURNS``.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -252,8 +252,8 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process an odometry report. It corrects the predictions and estimates that follow.
 
-        The message is 0x20 in the manual, but 0x12, directly after the ticks, from the public
-        firmware.
+        In the manual, the message is 0x20. The public firmware sends 0x12 instead, directly after
+        the ticks.
 
         ``late_s``: how much later than usual the report arrived, in s.
         """
@@ -298,7 +298,8 @@ class LoisOdometry:
     def _was_silent(self, now: float) -> bool:
         """Return whether a report at ``now`` ends a silence in which the motion is unknown.
 
-        The motion is known in a silence shorter than ``LOST_REPORTS_S`` without a new set-point.
+        The motion is known if the silence was shorter than ``LOST_REPORTS_S``, and no set-point
+        changed in it.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if not now > heard_s + self._unheard_s > -math.inf:

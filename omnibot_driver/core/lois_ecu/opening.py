@@ -100,7 +100,7 @@ class SettingsWriter:
     def ignored(self) -> bool:
         """Whether the board seems to ignore the settings.
 
-        The settings are still unconfirmed after twice the usual number of rounds.
+        True if they are still unconfirmed after twice the usual number of rounds.
         """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
 
@@ -114,7 +114,8 @@ class SettingsWriter:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
         While the robot drives, no round begins after the first ``ROUNDS``: each written gain resets
-        the controller of a wheel.
+        the controller of a wheel. But a round that has begun is completed: if it has written the
+        terminal mode, a later line must restore the left short correction.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
@@ -243,8 +244,9 @@ class SettingsWriter:
 
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
-        The first ``ROUNDS`` unconfirmed rounds begin with a Stop in the other form of lines
-        (``checksum``), for a board that another program has set to this form.
+        Another program may have set the board to the other form of lines (``checksum``) while the
+        robot rolls. The board then ignores the driver's usual Stops. So while the settings are
+        unconfirmed, each of the first ``ROUNDS`` rounds begins with a Stop in this form.
         """
         if self._queue or not self._rounds_left:
             return

@@ -2,8 +2,8 @@
 
 """Plausibility of a complete report: its values, and their change since the last report.
 
-Two successive reports that fit each other, but no earlier ones, show a restart or a reset of the
-board. This module works on values and arrival times.
+Two successive reports that fit each other, but not the last accepted report, show a restart or a
+reset of the board. This module works on values and arrival times.
 """
 
 import math

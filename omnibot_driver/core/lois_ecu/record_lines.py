@@ -95,8 +95,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The last line of a torque record looks like a sample of 0/0. It ends the record only after
-        all expected samples.
+        The last line of a torque record looks like a sample of 0/0. Such a line ends the record
+        only after all expected samples.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -30,7 +30,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
 """Times in s, from the first sending, at which the driver sends a request. Each interval is longer
-than the board can be unable to receive."""
+than the longest time in which the board cannot receive, and not a multiple of a usual report
+period."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Unit, in s, of the times in an RPM record. It follows from the unit of the board's clock in its
 tick reports (0x12)."""

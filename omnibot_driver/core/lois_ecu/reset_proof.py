@@ -18,7 +18,7 @@ zero. A stopped wheel is assumed to roll at most this far."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
 """``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: smallest fall of a count, to near
-zero, that proves a reset. No wheel can roll as far until the next counts."""
+zero, that proves a reset. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
 """``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count of a robot at rest
@@ -47,8 +47,8 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver repeats the reset.
 
-        ``before``: the counts at the repetition. They replace the earlier counts if they can prove
-        the reset, with the wheels at rest (``steady``).
+        ``before``: the counts at the repetition. They replace the earlier counts only if the wheels
+        are at rest (``steady``), and the counts are large enough to prove the reset.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop until RPM 0/0 is sent. RPM 0/0 ends the counting of ticks, which can show
-the standstill."""
+"""Time in s from a Stop until RPM 0/0 is sent. Until then, the tick counts can show the standstill;
+RPM 0/0 ends the counting."""
 CLEAR_AGAIN_S: Final = 0.15
 
 

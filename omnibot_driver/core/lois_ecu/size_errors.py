@@ -2,8 +2,9 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-The covariance is the spread of paths that are each computed with one error. Input: distances of the
-wheels; output: covariance of x, y and yaw.
+The path is computed again with each error, positive and negative. The covariance is the spread of
+the poses in which these paths end. Input: distances of the wheels; output: covariance of x, y and
+yaw.
 """
 
 import math

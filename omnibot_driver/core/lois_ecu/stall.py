@@ -36,8 +36,8 @@ FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
 """``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion that show a stall,
-after a forward or backward command. A wheel that rolls steadily backward can repeat its speed a few
-times."""
+after a forward or a backward command. While a wheel rolls steadily backward, the board can report
+the same speed a few times."""
 
 
 class StallWatch:
@@ -55,8 +55,9 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.may_roll = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of reports that could have shown a motion, but did not. Motion, a
-        new or reversed command, or a stall of any wheel sets it to zero."""
+        """For each wheel: number of reports that could have shown a motion, but did not. It is set
+        to zero by motion, by a command that starts or reverses the wheel, and by a stall of any
+        wheel."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
@@ -110,7 +111,7 @@ class StallWatch:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
         At least ``AT_LEAST`` (forward) or ``AT_LEAST_BACKWARD`` reports are needed. A stall
-        restarts the count for both wheels.
+        restarts the times and the counts of both wheels.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)
@@ -126,8 +127,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        The speed is unchanged, and either the other wheel's speed has changed, or ``wheel`` would
-        be too fast for its set-point.
+        True if the speed is unchanged, and either the other wheel's speed has changed, or the speed
+        is far above the set-point of ``wheel``.
         """
         if told is None or self._told is None:
             return False

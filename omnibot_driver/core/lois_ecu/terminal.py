@@ -62,7 +62,7 @@ class ModeChange:
     def stop_first(self, parameter: str, value: str) -> None:
         """Stop the robot, because ``parameter`` gets a new ``value``.
 
-        Motion is refused until the robot is seen at rest, or for about ``UNPROVED_S``.
+        Motion is refused until the robot is seen at rest, but at most for about ``UNPROVED_S``.
         """
         self._stopping[parameter], self._stopping_since_s = value, None
 
@@ -111,7 +111,8 @@ class ModeChange:
         """Return the command to send now to stop the robot before a change, or None.
 
         * First: Stop, until the robot is at rest, but at most for ``UNPROVED_S``.
-        * Then: RPM 0/0, until ``cleared``. With a positive target, backward ticks count as forward.
+        * Then: RPM 0/0, until ``cleared``. It clears the RPM target: while the target is positive,
+          the public firmware counts backward motion by duty as forward motion.
 
         ``stands``: whether the robot is seen at rest.
 

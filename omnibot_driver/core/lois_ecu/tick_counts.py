@@ -2,8 +2,8 @@
 
 """The tick counts of a LOIS ECU: the last ones, and whether new ones show a restart of the board.
 
-Counts and clock near zero are not a proof: wheels roll back, and a clock in ns wraps every 4.3 s.
-This module does not know other reports.
+Counts and a clock near zero do not prove a restart: wheels roll back, and a clock in ns wraps every
+4.3 s. This module does not know other reports.
 """
 
 import math
@@ -30,9 +30,9 @@ The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, pl
 ``RESTARTED_TICKS`` ticks.
 """
 SILENT_S: Final = 1.0
-"""Time in s without tick reports after which the clock alone shows a restart.
+"""Time in s without tick reports. After it, counts near zero and an irregular clock show a restart.
 
-Earlier, the wheels may also have rolled back.
+After a shorter time, the wheels may also have rolled back.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
@@ -45,7 +45,7 @@ The time limits how far the wheels may have rolled back.
 IN_FLIGHT_S: Final = 0.5
 """Time in s, from the first counts after a reset, in which counts may be from before the reset.
 
-They were sent before the board received the reset, or were read late.
+Such counts were sent before the board received the reset, or were read late.
 """
 
 
@@ -94,7 +94,7 @@ class TickCounts:
     def was_reset(self, ticks: Ticks, read_s: float) -> bool:
         """Return whether the board may have obeyed a reset since the last report of ticks.
 
-        A reset was sent, and a count is nearer to zero than before.
+        True if a reset was sent, and a count is nearer to zero than in the last report.
 
         ``read_s``: time of the read in s, without a correction for a late read.
         """
@@ -156,7 +156,8 @@ class TickCounts:
         The result is False in two cases:
 
         * The counts are larger than a wheel can roll in ``duration_s``.
-        * The clock counts ns, both wheels are counted, and the expected motion explains the counts.
+        * The clock counts ns, the board counts the ticks of both wheels, and the expected motion
+          explains the counts.
 
         ``fallen``: the larger decrease of a count.
         """
@@ -170,7 +171,7 @@ class TickCounts:
         return self._odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start, which followed the previous report.
+        """Return the time in s since the board's start, assumed to be after the previous report.
 
         None in two cases:
 

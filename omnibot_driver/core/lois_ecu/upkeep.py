@@ -39,10 +39,8 @@ class Upkeep:
     def configure(self, settings: LoisEcuSettings) -> None:
         """Use new settings. Changed settings are written to the board.
 
-        The robot is stopped before some changes:
-
-        * drive mode, or a request of a sensor's terminal mode.
-        * in duty mode: duty scale, or a lower ``max_duty``.
+        The robot is first stopped if the drive mode changes, or if a sensor's terminal mode is
+        requested; in duty mode, also if the duty scale changes, or if ``max_duty`` becomes lower.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:

@@ -17,7 +17,8 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
 tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""Indices of the body's states. Those of a wheel are for the left wheel; add 1 for the right wheel.
+"""Indices of the body's states. ``BIAS`` and ``EXCESS`` are those of the left wheel; those of the
+right wheel follow.
 
 * ``X``, ``Y``: position in m.
 * ``TURN``: distance of the right wheel minus that of the left wheel, in m.
@@ -93,9 +94,9 @@ class Wheel:
         self.rolled_to_m = 0.0
         """Distance in m that the wheel had rolled when its motion was last certain.
 
-        That is at a new measured speed, a restart, a reset of the controller, and the start of the
-        wheel. If the wheel has rested since then, the driver subtracts the distance that it has
-        added.
+        The motion is certain at a new measured speed, a restart of the board, a reset of the
+        controller, and the start of the wheel. If the wheel proves to have rested since then, the
+        driver subtracts the distance that it has added meanwhile.
         """
         self.begin_again()
 

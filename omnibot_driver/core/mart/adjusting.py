@@ -19,6 +19,8 @@ from omnibot_driver.core.readings import DisplacementReading
 WAG_S, WAG_UNITS = 0.2, 2
 """A small turn that tests the IMU in a drive in which the reported heading is constant.
 
+Only a working IMU reports the turn.
+
 ``WAG_S``: time in s for which the heading is constant before this turn.
 
 ``WAG_UNITS``: motor units added to the left motor, and subtracted from the right one.
@@ -27,7 +29,8 @@ WAG_S, WAG_UNITS = 0.2, 2
 SUPERVISED_S: Final = 1.0
 """Time in s without an answered change of the units, after which the driver sends ``CS 0 0`` in B.
 
-The answer shows that the server still supervises the motion: after a restart, the motors run on.
+The answer shows that the server still supervises the motion: after a restart of the server, the
+motors run on without supervision.
 """
 STARTED_M: Final = 0.01
 """Distance in m after which it is certain that the current units are enough to turn the motors."""
@@ -79,7 +82,7 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Set the ratio of wheel speeds (left / right) that gives the robot's turn.
+        """Set the ratio of wheel speeds (left / right) from which the robot's turn is computed.
 
         * Turn on the spot, and backward drive (B) without reported headings: the expected ratio.
         * All other motions: None.

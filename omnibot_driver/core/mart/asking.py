@@ -2,9 +2,9 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-After a use of this second UDP port, SM or SRM on the first port may hang the server
-(docs/internals/mart_protocol.md). This module knows commands and replies; it does not know why the
-stop port was used. The caller passes the time.
+The stop port is the server's second UDP port. After its use, SM or SRM on the first port may hang
+the server (docs/internals/mart_protocol.md). This module knows commands and replies; it does not
+know why the stop port was used. The caller passes the time.
 """
 
 import math

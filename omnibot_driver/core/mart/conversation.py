@@ -41,9 +41,10 @@ The new value is ``LOSS * trip_s + LOSS_S`` (s), at most ``delay_s``.
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """Times in s that determine whether the network is regarded as disturbed.
 
-``SLOW_S``: a longer urgent query (PRESSING) is a sign of a disturbance.
+``SLOW_S``: an urgent query (PRESSING) that takes longer is a sign of a disturbance.
 
-``DISTURBED_S``: for this time after a sign, a reply may answer an earlier query.
+``DISTURBED_S``: time after the last sign for which the network is regarded as disturbed. In this
+time, a reply may answer an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Urgent queries. The driver sends them even if a late reply to an earlier query may still come.
@@ -203,7 +204,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply may come late, and is recorded as missing, except the reply to a controlled move.
+        The reply is recorded as missing, because it may come late. Only the reply to a controlled
+        move is not recorded, because the stop of the move waits for it.
         """
         if self.pending is None:
             return None
@@ -269,8 +271,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        ``word`` is a query, its last reply was different, and an equal reply to another query or
-        move has just come.
+        True if ``word`` is a query, its last reply was different, and an equal reply to another
+        query or to a move has just come.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

@@ -46,13 +46,14 @@ STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 BEND_WALK: Final = 0.5
 """Ratio of random to constant error (standard deviations) of a turn computed from the commands.
 
-The constant error has the same sign in all intervals between two encoder counts.
+The constant error has the same sign in all intervals between two encoder counts; the random error
+is independent in each interval.
 """
 ASTRAY: Final = 0.7
 """Factor for a position error that an uncertain heading causes.
 
-Along and across the motion, the error is this factor times the variance of the heading (rad²), at
-most 1, as a fraction of the driven distance.
+As a fraction of the driven distance, the error is this factor times the variance of the heading
+(rad²), but at most 1. One such error is assumed along the motion, and another one across it.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.

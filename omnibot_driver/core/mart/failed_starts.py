@@ -16,8 +16,9 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""Number of starts of a backward drive (B) or a turn (R, L) in a row, without a turning right
-wheel, after which the driver gives up. Each start may move the robot by the left wheel."""
+"""Number of starts in a row of a backward drive (B) or a turn (R, L) that do not turn the right
+wheel, after which the driver gives up. Each of them may turn the left wheel, and so move the
+robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
@@ -31,8 +32,8 @@ class FailedStarts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: whether the reply certainly answers this start, and a late copy of it is
-        unlikely.
+        ``arrived``: whether the reply certainly answers this start command, and a late copy of the
+        command is unlikely.
         """
         word = self._start
         assert word is not None

@@ -20,7 +20,8 @@ The measured value is divided by the requested or the expected one, whichever is
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
-SLOW doubles the times per degree and inch; ``Done.slowness`` adapts them to the robot.
+The word SLOW in a request doubles the times per degree and inch; ``Done.slowness`` adapts them to
+the robot.
 """
 LEAST_PACE: Final = 0.65
 """Slowest motion of one run of a move, as a fraction of the usual speed of this move."""
@@ -127,8 +128,8 @@ class Done:
     def has_run_twice(self) -> bool:
         """Whether the measurements show that the server has run the move twice.
 
-        The server has completed the move, but the encoder shows only a second run, cut short by a
-        stop.
+        True if the server has completed the move, but the encoder count is too small for it: then
+        the count is that of a second run, which a stop has cut short.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large
@@ -155,6 +156,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        The reply belongs to another request, and a later stop has ended the move.
+        Such a reply belongs to another request. A stop that the driver has sent after it has then
+        ended the first run.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -68,8 +68,8 @@ GAP_S, GAP_LONGEST_S = 0.12, 1.0
 
 ``GAP_S``: shortest such silence; twice the average duration of a query is added.
 
-``GAP_LONGEST_S``: longest wait for a heading after such a silence. A heading of zero shows a
-restart.
+``GAP_LONGEST_S``: longest wait for a heading after such a silence. A heading of exactly zero shows
+a restart.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
@@ -220,7 +220,7 @@ class Ground:
     def _seems_present(self) -> bool:
         """Whether replies show that the server was not restarted since the last start command.
 
-        Since then, no silence between two replies was long enough for a restart.
+        True if, since then, no silence between two replies was long enough for a restart.
         """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
@@ -228,7 +228,8 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply. Decide whether the server may have been restarted.
 
-        Signs are a long silence, or earlier replies from another kind of server.
+        The signs are a long silence before this reply, or previous replies from another kind of
+        server.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
@@ -304,8 +305,8 @@ class Ground:
         After a forward drive (RM), the odometry needs a heading at rest before the first encoder
         count.
 
-        The wait lasts at most HEADING_S (s), plus HEADING_TRIPS times the duration of a query. Then
-        the driver logs NO_HEADING once.
+        The wait lasts at most HEADING_S (s), plus HEADING_TRIPS times the duration of a query. If
+        no heading has come by then, the driver logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

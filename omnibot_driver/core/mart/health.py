@@ -124,7 +124,7 @@ class Health:
     def _is_of_another(self, word: Word, inches: float) -> bool:
         """Return whether the distance is probably the reply to another query.
 
-        The distance is then 0 inches, or equals the last reading of the other sonar.
+        True if it is 0 inches, or if it equals the last reading of the other sonar.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
@@ -136,8 +136,8 @@ class Health:
     def _status(self, bits: int) -> None:
         """Record the status of the motor board.
 
-        A status other than 0 must come twice in a row, because a late encoder count can look like a
-        status.
+        A status other than 0 is believed only if it comes twice in a row, because a late encoder
+        count can look like a status.
         """
         if not 0 <= bits <= NO_READ:
             return
@@ -148,7 +148,8 @@ class Health:
     def outlives(self) -> None:
         """Record that the server answered a stop late, after the driver had used the stop port.
 
-        The stop port may still wait, and may hang during the next motion.
+        The stop port may still wait for the end of the motion that it should stop. It may then hang
+        during the next motion.
         """
         self.outlived, self._may_be_restarted = True, False
 
@@ -163,7 +164,8 @@ class Health:
     def rests(self, heading_rad: float) -> None:
         """Find out from the heading of a robot at rest whether the server was restarted.
 
-        Only a heading near zero shows a restart; drift or a user can change the heading too.
+        Only a heading near zero shows a restart: gyro drift, or a user who turns the robot, can
+        change the heading too.
         """
         if not self.outlived or not abs(heading_rad) < MOST_RAD:
             return
@@ -207,7 +209,8 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        Shortly after a failed RM (forward drive), the server is regarded as defective.
+        If the server has reported shortly before that RM (forward drive) failed, RM is assumed to
+        have started the motors nevertheless, and the server is regarded as defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

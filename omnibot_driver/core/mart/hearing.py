@@ -21,7 +21,8 @@ from omnibot_driver.core.mart.words import Form, Kind, Word
 BLIND_PART: Final = 0.15
 """Largest relative change of the motors' units after which a missing reply does not stop the robot.
 
-The limit applies if the robot's turn is computed from the units: backward (B), without headings.
+The limit applies to a backward drive (B) in which the server reports no headings: the robot's turn
+is then computed from the units.
 """
 
 
@@ -125,7 +126,8 @@ class Hearing(Measuring):
     def _trip_s(self) -> float:
         """Estimated time in s from a request to its reply at the moment.
 
-        The average of answered queries, or the delay of the last IMU check if it was longer.
+        It is the average duration of the answered queries, or the delay of the last check of the
+        IMU if that was longer.
         """
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 

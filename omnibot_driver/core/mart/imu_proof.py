@@ -2,7 +2,7 @@
 
 """The check that the IMU works (RST IMU, or MCR SLOW 0), and the results of the last checks.
 
-After a failed RST IMU, the server uses the IMU only after a successful one. This module knows
+After a failed RST IMU, the server does not use the IMU until RST IMU succeeds. This module knows
 replies and times; it does not know which motion is started. The caller passes the time.
 """
 

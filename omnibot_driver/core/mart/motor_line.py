@@ -2,8 +2,8 @@
 
 """A motor's speed as a function of its motor units: a straight line that the driver learns.
 
-Motor units: 0 to 127. Nominal units of speed: an ideal motor has 10 at 10 motor units. This module
-does not know wheels or time.
+A command sets the motor units, 0 to 127. Speeds are in nominal units: at 10 motor units, an ideal
+motor has the speed 10. This module does not know wheels or time.
 """
 
 import math
@@ -72,7 +72,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Record that the motor does not turn with ``units``: lower the offset accordingly.
+        """Lower the offset until the line gives no speed for ``units``: the motor does not turn.
 
         An obstacle may be the cause, so the offset becomes as uncertain as at the beginning.
         """

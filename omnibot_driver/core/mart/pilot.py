@@ -73,8 +73,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Make ``wanted`` the motion, goal or stop that the robot must carry out from now on.
 
-        A command cancels the current job; but a repeated goal does not cancel the download of a
-        turn's record.
+        A motion command or a stop cancels the current job. But a repetition of the present goal
+        does not cancel the download of a turn's record.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -242,7 +242,8 @@ class Pilot(Hearing):
     def _copy_stop_s(self) -> float:
         """Time at which to stop a suspected duplicate of a move; infinity without one.
 
-        Only in STILL: in other states, the stop commands SL and SS would hang the server.
+        It is also infinity in every state except STILL: in a forward or backward drive, the stop
+        commands SL and SS may hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf
@@ -255,7 +256,8 @@ class Pilot(Hearing):
     def _may_ask_volts(self, now: float) -> bool:
         """Return whether the query of the battery voltage (VOLTS) may be sent now.
 
-        VOLTS crashes a server that is starting up, so VOLTS waits after an unanswered request.
+        VOLTS crashes a server that is starting up. So VOLTS waits after an unanswered request,
+        because the server may have been restarted.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

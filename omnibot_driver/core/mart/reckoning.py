@@ -167,9 +167,9 @@ class Reckoning(CorrectedPose):
         return wrong_rad
 
     def _doubt_unread_turn(self) -> None:
-        """Add an error to the pose at the end of a forward drive (RM) whose last heading is old.
+        """Add an error to the pose at the end of a forward drive (RM) without a heading at rest.
 
-        The robot may have turned since that heading.
+        The robot may have turned since the last heading.
         """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)
@@ -311,8 +311,8 @@ class Reckoning(CorrectedPose):
     def stale(self, now: float) -> tuple[float, float]:
         """Return for how many s the turn rate has been out of date, and the resulting error.
 
-        The error is the heading's standard deviation in rad. Both values are 0 except in a forward
-        drive (RM).
+        The rate is out of date if the last heading is older than FRESH_S. The error is the
+        heading's standard deviation in rad. Both values are 0 except in a forward drive (RM).
         """
         stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:

@@ -24,7 +24,7 @@ twice.
 MOST_BACKWARD: Final = 5
 """Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-There, the driver does not notice that a command arrives twice.
+In such a drive, the driver does not notice that a command arrives twice.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
@@ -130,7 +130,7 @@ class SpeedLoop(Motors):
         """Return the units with which RM (forward) starts both motors.
 
         The slower wheel determines the units, from LEAST_UNITS to 60. After a start that turned no
-        motor, they are higher.
+        motor, they can be higher than this wheel needs.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -149,8 +149,9 @@ class SpeedLoop(Motors):
 
         ``units``: the units that both motors have; None for the current units of each motor.
 
-        Nothing is learned from a blocked motor: one that must turn with its units (from MOST_DEAD
-        on, or by its line).
+        MOST_DEAD units or more turn every motor, so nothing is learned from such a motor: it is
+        blocked. If ``units`` is None, the line of a motor that should certainly turn
+        (``MotorLine.turns``) does not change either.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

@@ -52,15 +52,15 @@ STEADY: Final = 0.03
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-* ``SPINS_UP_S``: least duration of the turn in s, without the averaging time of the rate.
+* ``SPINS_UP_S``: least duration of the turn in s; the averaging time of the rate is added.
 * ``SEEN_RAD``: least angle of the turn, in rad.
 * ``TOLD_RAD``: angle in rad above which the server's angle is used instead of the wheel's.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Terms of the largest plausible error of the angle in the reply to a stop command.
 
-UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two queries. Beyond
-it, the number may be an encoder count.
+The limit is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two
+queries. If the error is larger, the number may be an encoder count.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
@@ -112,7 +112,7 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
-        The caller must send SSP before the check of the IMU.
+        The caller must send SSP before the check of the IMU that precedes each turn.
 
         ``delay_s``: time in s after which no copy of an earlier SSP can arrive.
         """
@@ -257,7 +257,8 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Undo what was learned from a slow turn if the next turn is fast.
 
-        Something has then held the robot. Call this before the driver learns from a turn.
+        Something has then held the robot in the slow turn. Call this before the driver learns from
+        a turn: at a slow turn, the method stores what the driver knows.
 
         ``part``: the turn's measured rate divided by its commanded rate.
         """

@@ -109,8 +109,8 @@ class Starts(FailedStarts):
     def _switch_motors_off(self, now: float) -> Packets:
         """Return the next request that switches off the motors. No packets while it must wait.
 
-        MCS stops both motors; MSM ends the effect of MCS. They wait for late replies to earlier
-        requests, and MSM for duplicates of MCS.
+        MCS stops both motors; MSM ends the effect of MCS. Both wait until no late reply can be
+        mistaken for their own. MSM also waits until no duplicate of MCS can arrive after MSM.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -135,8 +135,9 @@ class Starts(FailedStarts):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether ``start`` must wait, because an earlier HELLO may arrive after it.
 
-        The answer to this HELLO would falsely exclude a duplicate of a controlled move. The wait
-        ends after ``NAME_WAIT_S``; a fresh check of the IMU already includes the wait.
+        Only a controlled move waits: the answer to this HELLO would falsely exclude a duplicate of
+        the move. The wait ends after ``NAME_WAIT_S``. After a fresh check of the IMU, there is no
+        wait, because the driver has already waited before the check.
         """
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False
