@@ -77,7 +77,10 @@ class PoseOdometry:
         """How often in a row a rejected pose has agreed with the pose before it, which was
         rejected, too."""
         self._jump: Pose | None = None
-        """Motion from the last accepted pose to the last rejected one, computed from wheel speeds.
+        """Motion from the last accepted pose to the last rejected one.
+
+        It is computed from wheel speeds. From one rejected pose to the next, these two poses give
+        it, except if the wheel speeds show that the frame may have moved again.
 
         It is not None if the rejected poses may be in a new coordinate frame: the wheel speeds are
         known for this whole time, and they contradict the first rejected pose.
@@ -172,8 +175,10 @@ class PoseOdometry:
         if self._jump is not None and rolled is not None:
             # The board computes poses and wheel speeds from the same encoders. So the poses have a
             # new origin, even if the robot could have driven to this place.
-            self._jump = self._jump.moved(roll(rolled))
-            if self._near(way - rolled, seconds):
+            off = way - rolled
+            moved_again = off.way_m > SLACK_M / 2 or abs(off.yaw_rad) > SLACK_RAD / 2
+            self._jump = self._jump.moved(roll(rolled if moved_again else way))
+            if self._near(off, seconds):
                 return self._in_moved_frame(pose, self._jump, since_s)
             if since_s <= FRESH_S:  # the origin may have moved again
                 self._agreed = 0

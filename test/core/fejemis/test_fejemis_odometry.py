@@ -185,6 +185,22 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
     assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
 
 
+def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
+    """The board's pose is set to zero during braking, and the next wheel speeds are lost.
+
+    The poses after it show the motion, so only the way to the first of them has an error.
+    """
+    drive = Drive()
+    drive.run(0.0, 0.0, 0.1)
+    drive.run(0.9, 0.0, 1.0)
+    before, drive.board = drive.out, Pose()
+    for v in (0.8, 0.7, 0.6):
+        drive.step(v, 0.0, heard=False)
+        drive.say(told(drive.board, drive.now))
+    drive.run(0.6, 0.0, 0.1)
+    assert drive.out.x_m - before.x_m == pytest.approx(drive.board.x_m, abs=0.004)
+
+
 @pytest.mark.parametrize("wait_s", [0.01, 0.03, 0.04, 0.05])
 @pytest.mark.parametrize("v", [0.5, 0.9])
 def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
