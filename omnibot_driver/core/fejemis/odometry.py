@@ -46,6 +46,10 @@ Each of these poses must agree with the rejected pose just before it.
 MOVED_FRAME: Final = 2
 """Number of agreements, as in ``NEW_FRAME``, if the wheel speeds explain the motion between the
 poses."""
+LONGEST_JUMP_S: Final = 0.2
+"""Longest time in s since the last accepted pose in which rejected poses that contradict each other
+may be due to an origin that moves again and again. Later, the poses are right, and the wheel speeds
+are wrong."""
 
 
 class PoseOdometry:
@@ -180,7 +184,7 @@ class PoseOdometry:
             self._jump = self._jump.moved(roll(rolled if moved_again else way))
             if self._near(off, seconds):
                 return self._in_moved_frame(pose, self._jump, since_s)
-            if since_s <= FRESH_S:  # the origin may have moved again
+            if since_s <= LONGEST_JUMP_S:  # the origin may have moved again
                 self._agreed = 0
                 return None
         self._jump = None

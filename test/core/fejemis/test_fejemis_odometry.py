@@ -221,6 +221,19 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
     assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.truth.x_m, abs=0.01)
 
 
+def test_a_pose_set_to_zero_three_times_at_once_does_not_move_the_odometry() -> None:
+    """Another program sends ``enc0`` three times within 0.1 s, in a curve."""
+    bench = nominal()
+    bench.drive_on(0.9, -1.0, 0.8)
+    for _ in range(3):
+        bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
+        bench.run(0.04)
+    bench.drive_on(0.9, -1.0, 0.5)
+    bench.run(1.5)
+    last, truth = bench.odometry[-1].pose, bench.robot.truth
+    assert Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last).way_m < 0.03
+
+
 @pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
     """With reads every 0.15 s, ``odom`` does not jump if another program sends ``enc0``.
