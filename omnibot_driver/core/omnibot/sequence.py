@@ -51,8 +51,8 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` is True only because of a pause, although the board may
-      have continued, and deltas may have been lost after the pause.
+    * ``doubtful``: whether ``restarted`` is True only because of a pause, although the board has
+      probably continued: a restarted board would have lost more deltas after the pause.
     """
 
     lost: int
@@ -82,7 +82,6 @@ class Sequence:
         Until then, the counters of poses are ignored.
         """
         self._paused = self._reconnected = False
-        self._paused_at = 0.0
         self._ahead: int | None = None
         """Counter of the last delta, if it was too high for the elapsed time; else None.
 
@@ -102,17 +101,14 @@ class Sequence:
         """What is needed to withdraw a supposed restart: the last counter before it, the arrival
         time of this counter in s, and the first counter after the restart."""
 
-    def pause(self, now: float) -> None:
+    def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
         The duration of the pause is unknown. So any other count than the next one may be that of a
         restarted board whose first deltas were lost. Without poses, which could disprove this, only
         a low count is regarded as that of a restarted board.
-
-        ``now``: time in s at which the board reported the pause. After the last report, only as
-        many deltas can be lost as the board can have sent since then.
         """
-        self._paused, self._pose, self._paused_at = True, None, now
+        self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
         """Begin a new connection: the board may have restarted in the meantime."""
@@ -137,8 +133,7 @@ class Sequence:
         lost = (count - before - 1) % WRAP
         if paused:
             anew = lost > 0 or count == 0 if self._regular else count <= lost
-            may_be_lost = lost * period_s <= now - self._paused_at + LATE_S
-            return Step(0, None, restarted=anew, doubtful=anew and may_be_lost)
+            return Step(0, None, restarted=anew, doubtful=anew and lost < count)
         wraps = max(0, round((elapsed_s / period_s - lost - 1) / WRAP))
         lost += wraps * WRAP
         late_s = abs((lost + 1) * period_s - elapsed_s)

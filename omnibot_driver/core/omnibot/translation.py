@@ -176,7 +176,7 @@ class Translation:
                 return pose
             case PausedFrame(count):
                 self._paused_count = count
-                self._sequence.pause(now)
+                self._sequence.pause()
                 self._rhythm = FrameSchedule(self._schedule)
                 if paused_count is None:
                     return PausedReading()

@@ -2,6 +2,8 @@
 
 """Tests of what the counter of the poses shows: lost deltas and restarts."""
 
+from collections.abc import Callable
+
 import pytest
 
 from omnibot_driver.core.omnibot.sequence import Sequence, Step
@@ -80,8 +82,10 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
     assert not sequence.ambiguous
 
 
-@pytest.mark.parametrize("paused", [True, False])
-def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(*, paused: bool) -> None:
+@pytest.mark.parametrize("interrupt", [Sequence.pause, Sequence.reconnect])
+def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
+    interrupt: Callable[[Sequence], None],
+) -> None:
     """After a gap of 2.1 s, both counters fit a restart as well as a loss of all deltas.
 
     Before the first pose, the board is paused, or the port is opened again. The pose is ambiguous
@@ -91,10 +95,9 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(*, paused
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
     for count in range(5):
-        now = begun_s + count * 0.04
         if count == 3:
-            sequence.pause(now) if paused else sequence.reconnect()
-        sequence.delta(count, now)
+            interrupt(sequence)
+        sequence.delta(count, begun_s + count * 0.04)
     sequence.pose(0, begun_s + 4 * 0.04)
     assert sequence.ambiguous
 

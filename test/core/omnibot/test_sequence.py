@@ -49,7 +49,7 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
     The count 0 is taken for a restart, because a restarted board begins at 0.
     """
     sequence = begun(count)
-    sequence.pause(100.0)
+    sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
     assert replace(step, doubtful=False) == Step(0, None, restarted=count == 255)
 
@@ -68,7 +68,7 @@ def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_boa
         sequence.delta((count + number - 10) % 256, at_s)
         if number % 5 == 0:
             sequence.pose(number // 5, at_s)
-    sequence.pause(100.0)
+    sequence.pause()
     step = sequence.delta(first, 100.0 + after_s)
     assert replace(step, doubtful=False) == Step(
         0, None, restarted=first == 0 or first != (count + 1) % 256
@@ -84,7 +84,7 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
     So the driver suspects a restart only if the count is not above the number of lost deltas.
     """
     sequence = begun(count)
-    sequence.pause(100.0)
+    sequence.pause()
     step = sequence.delta(first, 100.0 + after_s)
     assert replace(step, doubtful=False) == Step(
         0, None, restarted=first <= (first - count - 1) % 256
@@ -92,25 +92,34 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 
 
 @pytest.mark.parametrize(
-    ("first", "doubtful"), [(21, False), (22, True), (45, True), (80, False), (0, False)]
+    ("before", "first", "doubtful"),
+    [
+        (20, 21, False),
+        (20, 22, True),
+        (20, 45, True),
+        (20, 0, False),
+        (20, 3, False),
+        (240, 0, False),
+        (240, 3, False),
+        (240, 250, True),
+    ],
 )
-def test_a_restart_is_doubtful_if_so_many_deltas_can_be_lost_after_the_pause(
-    first: int, doubtful: bool
+def test_a_restart_after_a_pause_is_doubtful_if_a_board_that_continued_lost_fewer_deltas(
+    before: int, first: int, doubtful: bool
 ) -> None:
-    """The count before a pause is 20. The first one after it comes 1 s after the last report.
+    """The next count after a pause shows no restart.
 
-    The next count shows no restart. If a few counts are missing, the board may have restarted, or
-    it may have continued for up to 1 s without being heard. A higher number of missing counts shows
-    a restart for sure.
+    If counts are missing, the board has restarted, or it has continued. The case in which fewer
+    deltas are lost is the more probable one.
     """
-    sequence = begun(10)
+    sequence = begun(before - 10)
     for number in range(11):
-        sequence.delta(10 + number, 100.0 + number * 0.04)
+        sequence.delta(before - 10 + number, 100.0 + number * 0.04)
         if number % 5 == 0:
             sequence.pose(number // 5, 100.0 + number * 0.04)
-    sequence.pause(150.0)
+    sequence.pause()
     step = sequence.delta(first, 151.0)
-    assert (step.restarted, step.doubtful) == (first != 21, doubtful)
+    assert (step.restarted, step.doubtful) == (first != before + 1, doubtful)
 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
