@@ -57,8 +57,8 @@ class DisplacementReading:
     * ``lost``: number of missing displacements directly before this one.
     * ``restarted``: whether the board's counters and its earth frame seem to begin anew with this
       displacement.
-    * ``doubtful``: whether ``restarted`` may be wrong, because a few lost displacements would also
-      explain the counters. The restart is then not counted.
+    * ``doubtful``: whether ``restarted`` may be wrong, because a few lost displacements, or a late
+      one, would also explain the counters. The restart is then not counted.
     * ``measured``: False if the values are not a valid measurement, e.g. if the board only reports
       the commanded values.
     * ``possible``: False if the robot cannot move so fast. The cause may be a correction of the

@@ -51,8 +51,9 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` is True only because of a pause, although the board has
-      probably continued: a restarted board would have lost more deltas after the pause.
+    * ``doubtful``: whether ``restarted`` is True although the board has probably continued: a
+      restarted board would have lost more deltas after a pause; or no delta is missing after a
+      silence.
     """
 
     lost: int
@@ -147,7 +148,7 @@ class Sequence:
             and (reconnected or from_zero)
         ):
             self._renewed, self._left = True, (before, before_at, count)
-            return Step(0, None, restarted=True)
+            return Step(0, None, restarted=True, doubtful=not lost)
         latest_s = (lost + 1) * period_s - (
             period_s / 2 if imus == self._imus_per_delta else latest_late_s
         )

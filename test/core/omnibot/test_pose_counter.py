@@ -125,12 +125,14 @@ def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(restart
     """Nothing arrives for 4 s. Then the next count arrives.
 
     The board may have restarted and counted up to it, so the driver supposes a restart. The counter
-    of the next pose shows it, too. Or the board stood still for 4 s, and its counters continue.
+    of the next pose shows it, too. Or the board stood still for 4 s, and its counters continue. So
+    the delta alone does not count as a restart.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + 4.0
     steps = [sequence.delta((uptime + n) % 256, first_s + n * 0.04) for n in range(5)]
     assert [step.restarted for step in steps] == [True, False, False, False, False]
+    assert steps[0].doubtful
     pose = sequence.pose(15 if restarted else 6, first_s + 0.16)
     assert pose.restarted == restarted
 
