@@ -129,10 +129,10 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
 def _typed(
     table: parameters.Table, changed: Sequence[rclpy.Parameter]
 ) -> Sequence[rclpy.Parameter]:
-    """Return the changed parameters, each in its declared type: 1.0 for the integer 1.
+    """Return the changed parameters, each in its declared type.
 
-    Otherwise a later reader that asks for a double would get an integer. A wrong value is returned
-    unchanged; ``_check`` refuses it.
+    An integer for a floating-point parameter becomes a float, because code that reads this
+    parameter expects a double. A wrong value is returned unchanged; ``_check`` refuses it.
     """
     return [_in_own_type(table, item) for item in changed]
 

@@ -35,7 +35,8 @@ UNGUARDED_S: Final = 1.5
 Stop after the shutdown."""
 SILENCE_S: Final = 0.25
 """Longest wait at shutdown, in s, for the second proof that the robot is at rest (longer for a slow
-board). This proof shows that no damaged last Stop has moved the robot."""
+board). A Stop that is damaged on the line may move the robot. This proof shows that the last Stop
+did not."""
 BOTH_PROOFS_S: Final = 2.4
 """Longest time for both proofs at shutdown together, in s. The guard needs the rest of
 ``driver.LONGEST_END_S`` to repeat Stop."""

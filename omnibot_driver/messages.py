@@ -267,10 +267,11 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return wall clock minus steady clock, in ns: the possible value nearest to ``known_ns``.
+    """Return wall clock minus steady clock, in ns.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. ``known_ns``: the
-    previous result.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``, so only limits
+    of the result are known. Between them, it is the value nearest to ``known_ns``, the previous
+    result.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -188,13 +188,13 @@ Reading = (
 class SampleBoundary:
     """How far the stream of IMU samples had arrived when a read of the port ended.
 
-    * ``ahead``: 1 if at least the first part of a sample has arrived that was not returned as an
-      ImuReading yet, else 0.
+    * ``ahead``: 1 if a sample has arrived, at least its first part, and was not returned as an
+      ImuReading yet; else 0.
     * ``cut``: whether the end of this sample is missing. Such a sample is called a cut sample.
     * ``latest_s``: latest time at which the cut sample can be complete, in s after the read. It is
       0 without a cut sample.
-    * ``earliest_s``: earliest time at which the cut sample, or the next sample if none is cut, can
-      be complete, in s after the read.
+    * ``earliest_s``: earliest time at which the cut sample can be complete, in s after the read.
+      Without a cut sample, this is the time for the next sample.
     """
 
     ahead: int

@@ -61,7 +61,7 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "angular_velocity_stddev": _has_imu,
 }
 """For each common parameter that depends on the traits of the board: the function that decides
-whether a board with these traits has it."""
+whether a board with these traits has the parameter."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

@@ -17,8 +17,8 @@ from omnibot_driver.core.values import value
 class OdometrySettings:
     """The settings of the odometry.
 
-    * ``use_board_pose``: whether the board's poses correct the odometry. If not, only the heading
-      comes from them: once at the beginning, and once after each reset that follows a gap.
+    * ``use_board_pose``: whether the board's poses correct the odometry. If False, they give only
+      the heading, once at the beginning, and once after each reset that follows a gap.
     * ``fastest_mps``, ``fastest_radps``: speeds that even a pushed robot does not exceed.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the reported ones.
     """

@@ -39,8 +39,8 @@ by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
 """Largest standard deviation, in rad, with which the board's heading counts as known.
 
-Only lost displacements make the heading uncertain: the standard deviation is that of the turn in
-them. When a pose of the board has shown the lost motion, the heading is known again.
+Only lost displacements make the heading uncertain, because the turn during the loss is unknown.
+When a pose of the board has shown the lost motion, the heading is known again.
 """
 
 
@@ -64,13 +64,17 @@ class Odometry:
         self.configure(settings)
         self._backlog = PendingDisplacements()
         self._since_gap: Pose | None = None
-        """Pose of a board that began a new frame in the longest gap since the last pose. None if
-        there was no gap, or if the robot was near the origin of the board's frame before it."""
+        """The pose that the board would report now if it had begun a new frame in the longest gap
+        since its last pose.
+
+        None if no displacement was lost since this last pose, or if the robot was near the origin
+        of the board's frame before the gap.
+        """
         self._gap_lost = 0
-        """Number of displacements lost in this gap."""
+        """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""
         self._told_lost = 0
-        """Number of lost displacements that an unconfirmed pose has shown, and that no displacement
-        in ``_backlog`` counts yet."""
+        """Number of lost displacements that unconfirmed poses have shown. They are still to be
+        added to ``lost`` of the next displacement or pose."""
         self.reset()
         self._reset_s: float | None = None
         """Time in s of the last reset; None if a displacement has arrived since then."""
@@ -102,11 +106,11 @@ class Odometry:
 
         Return the estimates of displacements that were still waiting for a pose. Displacements that
         waited for the board's first pose are discarded. If the next displacement ends a gap, and
-        most of this gap is older than the reset, its motion is discarded too. Its estimate is then
-        at the origin, with an unknown twist.
+        most of this gap is older than the reset, the motion of the gap and of this displacement is
+        discarded too. The estimate is then at the origin, with an unknown twist.
 
-        If motion was lost before the reset, the board's heading is uncertain. So the board's next
-        poses show it again, as they showed the initial heading.
+        If motion was lost before the reset, the board's heading is uncertain. The odometry then
+        takes the heading from the board's next poses, as it did at the beginning.
 
         ``now``: time of the reset in s, by the clock of the stamps. By default, the reset is at the
         end of the present gap.
@@ -123,7 +127,10 @@ class Odometry:
         return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
-        """Add a displacement; return its estimates, or none while it waits for a pose."""
+        """Add a displacement; return all new estimates, or none while it waits for a pose.
+
+        The displacements that waited before this one may also have estimates now.
+        """
         estimates = []
         reset_s, self._reset_s = self._reset_s, None
         if reset_s is not None:
@@ -230,7 +237,7 @@ class Odometry:
     # The board's frame
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
-        """Return whether the odometry must adopt a new frame of the board, that of this pose.
+        """Return whether the pose is in a new frame of the board, which the odometry must adopt.
 
         ``confirmed``: whether the pose agrees with the last doubted pose.
 
@@ -253,7 +260,9 @@ class Odometry:
     def _began_in_gap(self, told: Pose, since_gap: Pose) -> bool:
         """Return whether a pose shows that the board began a new frame in a gap before it.
 
-        The counters do not decide, because they fit both cases. ``told``: the pose.
+        The counters cannot show this: a loss of all displacements in the gap also explains them.
+
+        ``told``: the pose.
 
         ``since_gap``: the pose that is expected if the board began a new frame.
         """

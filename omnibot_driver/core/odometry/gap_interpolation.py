@@ -27,9 +27,9 @@ class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
-      If only poses arrive, it is the mean motion per displacement between the accepted poses.
-    * ``missing``: number of lost displacements since the last displacement or accepted pose. A pose
-      has shown that they were lost, and they were assumed to be equal to ``last``.
+      If only poses arrive, ``last`` is the mean motion per displacement between accepted poses.
+    * ``missing``: number of displacements that were lost after the last displacement or accepted
+      pose. A pose has shown the loss, and the lost motion was assumed to be like ``last``.
     """
 
     def __init__(self) -> None:
@@ -80,9 +80,10 @@ class GapInterpolation:
         return start
 
     def prove(self, way: Pose = NO_WAY) -> None:
-        """Record that a pose was accepted. If only poses arrive, correct ``last`` by it.
+        """Record that a pose was accepted.
 
-        Afterwards, ``last`` is the mean motion per displacement since the previous accepted pose.
+        If only poses arrive, use this pose to correct ``last``. Afterwards, ``last`` is the mean
+        motion per displacement since the previous accepted pose.
 
         ``way``: deviation of the pose from the assumed motion, as a tangent in body axes.
         """

@@ -42,7 +42,7 @@ class PendingDisplacements:
     def restart(self) -> None:
         """Record that the board restarted directly before the first displacement that waits here.
 
-        The number of lost displacements before it, and its duration, are then unknown.
+        The duration of this displacement, and the number of those lost before it, are then unknown.
         """
         if self._waiting:
             reading, stamp_s = self._waiting[0]

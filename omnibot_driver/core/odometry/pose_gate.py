@@ -20,8 +20,8 @@ BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
 with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
 
-After a loss of displacements, the driver adds the motion that they may contain to both limits. The
-next accepted pose includes this motion, so the limits then have their usual values again.
+After a loss of displacements, both limits are larger, because the robot may have moved during the
+loss. The next accepted pose includes this motion, so the limits then have their usual values again.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -49,8 +49,8 @@ class PoseGate:
     def displaced(self, reading: DisplacementReading, *, bridges: bool) -> None:
         """Add a reported motion of the robot to the unconfirmed pose ``doubted``.
 
-        ``bridges``: whether the lost displacements before it are added too, as if they were equal
-        to it. If not, the caller adds them by ``bridged``.
+        ``bridges``: whether displacements that were lost before this motion are added too, each
+        as a repetition of this motion. If not, the caller adds them with ``bridged``.
         """
         if self.doubted is None:
             return
@@ -68,7 +68,10 @@ class PoseGate:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """Add ``seconds``, by the board's clock, to the time in which the robot may have moved."""
+        """Add ``seconds``, by the board's clock, to the time since the last accepted pose.
+
+        In this time, the robot may have moved.
+        """
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:

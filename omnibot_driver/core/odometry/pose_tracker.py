@@ -89,7 +89,10 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps, counted_s)
 
     def halt(self, tangent: Pose) -> None:
-        """Add the uncertainty of a robot that came to rest unseen, on about this tangent."""
+        """Add the uncertainty that arises because the robot came to rest when its board restarted.
+
+        ``tangent``: mean motion until the robot was at rest.
+        """
         way = _times(tangent, self._size)
         self.uncertainty.halt(way.way_m, way.yaw_rad)
 

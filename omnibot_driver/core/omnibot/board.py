@@ -216,7 +216,7 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Do nothing after a stall: the driver stops the wheels anyway, and nothing else moves."""
+        """Do nothing: after a stall, the driver stops the wheels; the board drives nothing else."""
 
     def due(self, now: float) -> Packets:
         """Return no packets, because the board sends without polling."""
@@ -241,7 +241,7 @@ class OmniBot:
         return packed(STOP)
 
     def start_requested(self) -> None:
-        """Do nothing: a start by the user needs the same bytes as a start by the driver."""
+        """Do nothing: this board needs no preparation for a start that the user requests."""
 
     def start(self) -> Packets:
         """Return the letter S, which starts the board."""

@@ -79,10 +79,10 @@ frame."""
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Cost of an IMU frame. Index: number of its words that differ much from the previous frame.
+"""Cost of an IMU frame, by the number of its words that differ much from the previous IMU frame.
 
-If only one word differs, it is most likely damaged. A shock changes several words, so the cost of
-more words is only a little higher.
+A single such word is most likely damaged. A shock changes several words at once, so several such
+words cost only a little more than one.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an IMU frame with unusual content that follows another such frame.
@@ -116,10 +116,10 @@ IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""Largest rounding error of a sum of n deltas, in 0.1 mrad: ``ROUNDING`` + n *
-``ROUNDING_PER_DELTA``.
+"""``ROUNDING``, ``ROUNDING_PER_DELTA``: limits of rounding errors, in 0.1 mrad.
 
-For five deltas, it is at most 4.
+The rounding error of a sum of n deltas is at most ``ROUNDING`` + n * ``ROUNDING_PER_DELTA``: 4 for
+five deltas.
 """
 FASTEST: Final = 1e5
 """Largest possible speed: 10 m/s or 10 rad/s, in the unit 0.1 mm/s or 0.1 mrad/s."""
@@ -146,7 +146,8 @@ class Context(NamedTuple):
     deltas: int = 0
     """Number of deltas since the last pose."""
     shaken: bool = False
-    """Whether the last IMU frame had unusual acceleration, or differed much from the one before."""
+    """Whether the last IMU frame had unusual acceleration, or differed much from the IMU frame
+    before it."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 

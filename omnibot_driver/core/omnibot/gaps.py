@@ -45,7 +45,7 @@ after a pause, the read was late."""
 PAUSES_TO_TRUST: Final = 16
 """Number of pauses between frames after which the driver trusts that the board makes these pauses.
 
-If it has seen fewer pauses, an adapter may still be their cause.
+After fewer pauses, an adapter may still be their cause.
 """
 
 _FIRST: Final = attrgetter("first")

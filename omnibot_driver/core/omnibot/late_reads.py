@@ -169,10 +169,11 @@ def _by_the_next_frame(
     """Return the cause of a pause within a frame, as far as the next frame shows it.
 
     The line was idle if the next frame also contains a pause, and if the two pauses end a whole
-    number of ticks apart. Each of the two frames then consists of parts of two real frames.
+    number of ticks apart. Each of the two frames then consists of parts of two real frames. The
+    line was also idle if the next bytes are not a frame.
 
-    ``start``: position of the next frame. ``first``: the read that ended the pause in the frame
-    before.
+    ``start``: position of the next frame. ``first``: the read that ended the pause in the earlier
+    frame.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

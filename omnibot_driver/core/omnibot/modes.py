@@ -50,9 +50,9 @@ class ModeTracker:
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.mode = Mode.UNKNOWN
         self._imus_alone = self.imus_to_come = schedule.imus_alone
-        """``_imus_alone``: a number of IMU frames without a delta between them. After this number,
-        the driver assumes IMU-only mode. ``imus_to_come``: how many IMU frames are still missing to
-        this number."""
+        """``_imus_alone``: number of IMU frames in a row, without a delta, after which the driver
+        assumes IMU-only mode. ``imus_to_come``: how many of these IMU frames have not arrived
+        yet."""
 
     def apply(self, happening: Happening) -> None:
         """Apply one event of the table. Raises RequestRefused if the mode does not allow it."""

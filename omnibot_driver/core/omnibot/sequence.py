@@ -35,12 +35,12 @@ board's pose can then prove a restart.
 EARLY_S: Final = 0.2
 """Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-After a restart, the time that the counter shows is shorter than the time since the last delta was
-read, except if the driver read this delta very late. The tolerance allows for this case.
+If it did, the count times the period is less than the time since the last delta was read. It can be
+more only if the driver read this delta very late. The tolerance allows for this case.
 """
 LONG_GAP_S: Final = 1.0
-"""A pose does not show a restart if deltas of more than this duration, in s, are missing before it.
-The pose is compared with the last delta, which is then too old."""
+"""Longest gap before a pose, in s, after which this pose can still show a restart of the board. The
+pose is compared with the last delta, which is too old after a longer gap."""
 
 
 @value(frozen=True, slots=True)
@@ -51,9 +51,8 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` is True although the board has probably continued: a
-      restarted board would have lost more deltas after a pause; or no delta is missing after a
-      silence.
+    * ``doubtful``: whether ``restarted`` may be wrong. This is so after a pause of the board, if a
+      loss of deltas without a restart would also explain the counter.
     """
 
     lost: int
@@ -90,11 +89,11 @@ class Sequence:
         number of lost deltas is computed from the elapsed time.
         """
         self.ambiguous = False
-        """Whether both counters, at the last pose, fit a restart in the gap before this pose
-        as well as a loss of all deltas in this gap."""
+        """Whether the counters at the last pose have two explanations: a restart of the board in
+        the gap before this pose, or a loss of all deltas in this gap."""
         self._may_be_new = False
-        """Whether a gap has ended since the last pose, and the counter of the delta after it
-        also fits a counter that began at zero in this gap.
+        """Whether deltas were lost since the last pose, and the counter of the delta after this
+        gap is so low that the board may have restarted in the gap.
 
         A pause or a reconnection does not change this: the next pose is still the first one after
         the gap."""
@@ -105,9 +104,12 @@ class Sequence:
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
-        The duration of the pause is unknown. So any other count than the next one may be that of a
-        restarted board whose first deltas were lost. Without poses, which could disprove this, only
-        a low count is regarded as that of a restarted board.
+        The duration of the pause is unknown. So if the next delta does not continue the count, the
+        board may have restarted, and its first deltas may be lost. Poses could disprove a restart.
+        Without them, only a low count is regarded as a restart.
+
+        ``now``: time in s at which the board reported the pause. It limits the number of deltas
+        that can be lost: the board sent them after its last report of the pause.
         """
         self._paused, self._pose = True, None
 
@@ -209,10 +211,10 @@ class Sequence:
         return Step(missing)
 
     def _from_zero(self, count: int, delta: int, elapsed_s: float) -> bool:
-        """Return whether the counters of a new pose and of the last delta fit a common zero.
+        """Return whether the counters of poses and deltas can have begun at zero together.
 
-        ``elapsed_s``: time since the previous pose in s. If it is long enough, the counter of the
-        deltas may have wrapped since the zero.
+        ``count``, ``delta``: the counters of a new pose and of the last delta. ``elapsed_s``: time
+        since the previous pose in s. If it is long enough, ``delta`` may have wrapped meanwhile.
         """
         passed = count * self._per_pose
         wraps = max(0, round((passed - delta) / WRAP))

@@ -16,7 +16,8 @@ class OmniBotSettings:
 
     * ``linear_scale``, ``angular_scale``: LSB per m/s and per rad/s of a commanded velocity.
     * ``position_scale``, ``heading_scale``: LSB per m and per rad of a commanded pose.
-    * ``delta_frame``: "earth", "body", or encoder "wheel_counts" (older firmware).
+    * ``delta_frame``: axes of the deltas, "earth" or "body"; "wheel_counts" if the deltas contain
+      encoder counts (older firmware).
     * ``delta_period_s``: one of ``schedule.DELTA_PERIODS_S``; constant while the ``OmniBot``
       exists.
     """

@@ -42,7 +42,8 @@ waits less than 10 s for the result of a reset. If the counter shows more lost t
 again, because the board has restarted.
 """
 FULL: Final = 4000
-"""Number of bytes in a read from which on the kernel's buffer of 4 KiB counts as full.
+"""If a read has at least this number of bytes, the driver assumes that the kernel's buffer of 4 KiB
+was full.
 
 The decoder may keep some bytes of a read for later, and only the other bytes are counted. So the
 number is below 4096.
@@ -50,8 +51,8 @@ number is below 4096.
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The next read is late if the board needs more than twice the time between the two reads, plus
-``BURST_S``, to send the bytes of the next read.
+The next read is late if it contains too many bytes for the time since the previous read: the board
+needs more than twice this time, plus ``BURST_S``, to send them.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2

@@ -30,8 +30,8 @@ STOP_UNSEEN: Final = (
     " Stop for 5 s after each stop; check by eye that the robot has stopped"
 )
 STOP_BLIND: Final = (
-    "stop unconfirmed: the board does not measure its wheels after the last motion command; check"
-    " by eye that the robot has stopped (reported once)"
+    "stop unconfirmed: after a motion command like the last one, the board does not measure its"
+    " wheels; check by eye that the robot has stopped (reported once)"
 )
 STOP_UNANSWERED: Final = (
     "stop unconfirmed: the board is not responding; if the robot moves, cut its motor power; then"
@@ -113,7 +113,8 @@ class Notices:
 
         ``measured``: whether displacements have arrived since Stop.
 
-        ``blind``: whether the board did not measure its wheels after the last command.
+        ``blind``: whether the last motion command is one after which the board does not measure
+        the wheels.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)

@@ -206,7 +206,7 @@ class DeviceClock:
         """Return how many ticks to add to the tick number, as a displacement's counter shows.
 
         The result is negative if the tick number is too high. It is 0 if there is no earlier
-        displacement, or if this one has no duration.
+        displacement, or if the new displacement has no duration.
         """
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
@@ -288,8 +288,9 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: this step's share of the time in s from the last stamp to the read. The smallest
-        step is half a period or ``room_s``, whichever is shorter, but at least ``SMALLEST_STEP_S``.
+        ``room_s``: time in s from the last stamp to the read, divided among the stamps that are
+        still to be set. The smallest step is half a period or ``room_s``, whichever is shorter, but
+        at least ``SMALLEST_STEP_S``.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -20,8 +20,9 @@ class Terminal:
 
     While ``UNREAD_LIMIT`` bytes are unread, further bytes are lost.
 
-    ``link``: path of a symbolic link, which replaces a dead link or one to a pseudo-terminal.
-    Raises OSError if the link cannot be made (FileExistsError if the path is taken).
+    ``link``: path of a symbolic link to make. An existing link is replaced only if it is dead or
+    leads to a pseudo-terminal. Raises OSError if the link cannot be made (FileExistsError if the
+    path is taken).
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

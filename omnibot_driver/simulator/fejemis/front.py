@@ -205,8 +205,9 @@ class FrontTeensy(Teensy[FrontConfig]):
     def _remote_control(self, rest: str) -> None:
         """Set the angle that the wheel must reach: ``atan2(F w, v)``, limited to ±90°.
 
-        ``v``, ``w``: commanded speed and turn rate; both negated for a "mirrored" reverse. ``F``:
-        distance from the axle to the front wheel.
+        ``v``, ``w``: commanded speed and turn rate. If the robot must drive backward and the
+        firmware is "mirrored", both are negated first. ``F``: distance from the axle to the front
+        wheel.
         """
         _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)

@@ -24,8 +24,8 @@ class Firmware:
     * ``tilt``: ``pose`` has a fifth number, the tilt.
     * ``start_resumes``: ``start`` resumes the last ``rc``, even one received while stopped.
     * ``confirms``: a command after ``!`` is confirmed.
-    * ``shows_source``: the drive's heartbeat shows the source of the last ``rc``, not only 10 or
-      -1.
+    * ``shows_source``: the drive Teensy's heartbeat shows the source of the last ``rc``. Otherwise
+      it shows only 10 (motion allowed) or -1 (stopped).
     * ``single_precision``: times are float32, with steps of 0.2 ms after an hour.
     * ``says_start``: a boot ends with the line ``# Starting main loop``.
     * ``exact_words``: a command without numbers must be the whole line, as in related firmware.
@@ -71,7 +71,8 @@ class FejemisSettings:
       frequency of the manual's controller is 12 rad/s.
     * ``sensor_zero_deg``: zero offset of the angle sensor, which the factory configuration
       corrects.
-    * ``clock_ppm``, ``ids``: clock rate errors and heartbeat numbers of drive and front Teensy.
+    * ``clock_ppm``, ``ids``: for the drive and the front Teensy, the error of the clock's rate in
+      ppm, and the id in heartbeats.
     * ``uptime_s``: time for which the Teensys have run at construction. If it is longer than
       ``boot_s``, they have booted.
     * ``swapped``: whether the drive Teensy is at the second port.

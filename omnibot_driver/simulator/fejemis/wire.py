@@ -42,9 +42,9 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Return the result of the check, the line without ``;NN``, and its correct checksum.
+    """Check a line. Return the result, the line without ``;NN``, and the correct checksum.
 
-    The checksum is 0 if the line has no ``;NN``.
+    The returned checksum is 0 if the line has no ``;NN``.
     """
     found = _PREFIX.match(text)
     if found is None:

@@ -123,8 +123,8 @@ class SimulatedLois:
     def terminal_mode(self) -> int:
         """Terminal mode that the last command 0x11 set.
 
-        In other modes than 0 and 4, the board sends no periodic messages or records, and with the
-        quirk ``button_is_lost_in_terminal_mode`` no reports of the e-stop button.
+        In modes other than 0 and 4, the board sends no periodic messages and no records. With the
+        quirk ``button_is_lost_in_terminal_mode``, it does not report the e-stop button either.
         """
         return self._terminal.mode
 
@@ -283,7 +283,10 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Run the main loop for 1 ms: complete the check of all timers, and repeat the check."""
+        """Run the main loop for 1 ms, in which it checks all timers at most twice.
+
+        The first check may have begun in an earlier step.
+        """
         for _ in range(2):
             if not self._scan:
                 if self._uart.input:

@@ -15,8 +15,8 @@ TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_PER_TURN_US = 300_000
-"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. Encoder levels
-shorter than this time divided by the edges per turn give no speed."""
+"""Time in µs of one turn at 200 RPM, the highest speed that the board can measure. An encoder
+level gives no speed if it is shorter than this time divided by the edges per turn."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024
