@@ -37,8 +37,8 @@ RAW_DEPTH: Final = 1000
 every byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Limit of a simulated clock, in ns: later measurements are not published. A stamp may be later
-than the clock, so the limit is a minute before the latest possible stamp."""
+"""Time of a simulated clock, in ns, from which on measurements are not published. A stamp may be
+later than the clock, so this is a minute before the latest time that a ROS stamp can have."""
 
 
 class Publishing:

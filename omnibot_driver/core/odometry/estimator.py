@@ -127,9 +127,10 @@ class Odometry:
         return due
 
     def displace(self, reading: DisplacementReading, stamp_s: float) -> list[OdometryEstimate]:
-        """Add a displacement; return all new estimates, or none while it waits for a pose.
+        """Add a displacement; return all new estimates.
 
-        The displacements that waited before this one may also have estimates now.
+        A displacement that waits for a pose has no estimate yet. If displacements have waited
+        before, their estimates may be returned now.
         """
         estimates = []
         reset_s, self._reset_s = self._reset_s, None

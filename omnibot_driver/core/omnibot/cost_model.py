@@ -281,8 +281,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    The byte must occur in headers. In an IMU frame, the byte must also be FF, or the frame's last
-    word must differ from the last word of the previous IMU frame.
+    It may only if the byte occurs in headers. In an IMU frame, the byte must also be FF, or the
+    frame's last word must differ from the last word of the previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

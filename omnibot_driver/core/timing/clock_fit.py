@@ -27,11 +27,11 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Position of the edge that is used as the fitted clock, in the hull's time span (0 to 1).
+"""Selects the edge of a convex hull that is used as the fitted clock.
 
-Without lower bounds, the fitted clock is an edge of the lower convex hull of the latest points. A
-larger value selects a later edge: the clock follows recent points more closely, but jitter affects
-it more.
+Without lower bounds, the fitted clock is an edge of the lower convex hull of the latest points: the
+edge at this fraction, 0 to 1, of the hull's time span. A larger value selects a later edge: the
+clock follows recent points more closely, but jitter affects it more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the

@@ -188,7 +188,8 @@ class DeviceClock:
         """Return the tick number of each reading.
 
         Lost readings are counted, too. The board's own counter in a displacement also gives the
-        number of ticks that have passed. If it differs, the tick number is corrected.
+        number of ticks that have passed. If this number differs from the count, the tick number is
+        corrected.
         """
         ticks: list[int] = []
         for reading in readings:
