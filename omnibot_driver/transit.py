@@ -34,7 +34,11 @@ LASTING_DRIFT: Final = 1e-4
 NTP adds at most ``LARGEST_CORRECTION_S``, because it steps the clock if the error is larger.
 """
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which a message that is too early fits a sender worse than one that is too late."""
+"""Factor for the misfit of a message that seems too early for its sender.
+
+If a message is too late, its misfit is the time by which it is late. If it is too early, its misfit
+is ``CLOCK_RETREATS`` times the time by which it is early.
+"""
 ALIKE_S: Final = 0.02
 """Difference of misfits (``_Sender.misfit_s``) in s up to which two senders fit a message equally.
 
@@ -72,8 +76,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: time of sending by our clock, and also by the sender's clock while its offset is
-      unknown.
+    * ``sent_ns``: possible times of sending, as time of day. The first is by our clock. While the
+      offset of the sender's clock is unknown, the second is the time by the sender's clock.
     """
 
     total_s: float

@@ -240,7 +240,7 @@ class Several:
             port.close()
 
     def _require_one(self) -> None:
-        """Raise LinkError, with the reason of the first line, if all lines are missing."""
+        """Raise LinkError if all lines are missing. It says why the first line is missing."""
         if len(self.missing) == len(self._lines):
             raise LinkError(self._lines[0].trouble)
 

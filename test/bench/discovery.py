@@ -21,7 +21,7 @@ PORT: Final = "11811"
 WINDOW_S: Final = 30.0
 """Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Time in s for the drivers to start, and for the last packets of the search to arrive.
+"""Time in s for the drivers to start, and for the last packets of a search for drivers to arrive.
 
 No event reports the last packet.
 """

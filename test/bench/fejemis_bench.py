@@ -136,7 +136,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     """Measure the delays. Return an empty list of figures, and the rows of a table.
 
-    The list is empty because the Fejemis has no floor to compare with.
+    The figures would compare the driver with a minimal program (the floor). The Fejemis has none.
     """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",

@@ -91,7 +91,7 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start ``steps.py``, a relay that publishes a board's data and does some driver's tasks.
+    """Start ``steps.py``, a relay of a board's data that does some of the driver's tasks.
 
     ``what``: a key of ``STEPS`` in ``steps.py``. It selects the tasks that the relay does.
     """

@@ -33,7 +33,8 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot, no rate in its diagnostics: the present rate; NaN for a robot with two wheels.
+        * One robot without a rate in its diagnostics: the rate of this stream is kept; for a robot
+          with two wheels, the rate is NaN.
         * Several robots: their common rate; NaN if there is none.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]

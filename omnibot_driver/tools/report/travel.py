@@ -15,9 +15,10 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits of the deviation between pose and twist in a step, in m and rad.
+"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad above which the pose has jumped (a leap).
 
-A larger deviation between two messages is a leap. The driver's own corrections of odom are smaller.
+They limit the difference between the change of the pose and the motion by the twist, from one
+message to the next. The driver's own corrections of odom are smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
@@ -39,7 +40,8 @@ class Steps:
 
     ``off_m``, ``off_rad``: difference between the change of the pose and the motion by the twist.
 
-    ``leap``: whether this difference is too large; in a gap, only for a step to the zero pose.
+    ``leap``: whether this difference is too large. In a gap, the twist does not show the motion, so
+    only a step to the zero pose can be a leap.
 
     ``reset``: whether the step is a leap to the zero pose.
     """

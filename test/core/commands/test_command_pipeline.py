@@ -260,9 +260,9 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """A command is refused because its stamp is too old or in the future.
+    """The driver refuses a command whose stamp is too old or in the future.
 
-    The command before it expires as usual.
+    The refused command does not prolong the previous one, which expires as usual.
     """
     bench.drive(0.3)
     bench.run(0.4)

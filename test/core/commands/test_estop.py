@@ -69,9 +69,10 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """An e-stop that was latched while the port was closed is sent directly after Stop and S.
+    """The user latches the e-stop while the port is closed.
 
-    Stop and S (start) are the first bytes after the opening of the port.
+    After the opening of the port, the driver sends Stop and S (start), and directly after them the
+    emergency stop.
     """
     bench.close()
     assert "port is not open" in estop(bench, True)
@@ -102,9 +103,9 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """One notice advises a call of ~/reset if the board itself still holds a released e-stop.
+    """The user has released the e-stop, but the board keeps its own emergency stop latched.
 
-    Such a board ignores all commands until it is reset.
+    Such a board ignores all commands until it is reset. One notice advises a call of ~/reset.
     """
     bench = driving(estop_latches=True)
     estop(bench, True)

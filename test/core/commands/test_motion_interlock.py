@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion interlock: when a robot that did not move as commanded may move again.
+"""Tests of the motion interlock: when a robot that the motion monitor has stopped may move again.
 
-The motion monitor has stopped this robot.
+The motion monitor stops a robot that does not move as commanded.
 """
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
@@ -75,9 +75,10 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A stop by the motion monitor, more than a minute after the last, is a first stop.
+    """After the motion monitor has stopped a robot for the first time, ~/start is not needed.
 
-    A stop after a call of ~/start is a first stop too. After a first stop, ~/start is not needed.
+    A stop counts as the first one again if the previous stop was more than a minute earlier, or if
+    ~/start was called since then.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
@@ -90,9 +91,10 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """On a board without ~/start, a release of the e-stop ends the refusal after a second stop.
+    """A board without ~/start is stopped by the motion monitor twice within a minute.
 
-    Both stops were within a minute. A release between them does not help.
+    Motion is refused until the user releases the e-stop after the second stop. A release between
+    the two stops does not count.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

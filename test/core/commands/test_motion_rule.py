@@ -62,9 +62,10 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """A restart that only the counters in the board's frames show discards the current command.
+    """A board restarts while its data is lost, and another program starts it at once.
 
-    Another program starts the board while its data is lost.
+    Only the counters in the board's frames show the restart. The driver discards the current
+    command.
     """
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
@@ -84,9 +85,10 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """A restarted board receives no motion frame after a boot of 0.4 s.
+    """A board restarts and boots for 0.4 s. The driver sends no motion frame after the boot.
 
-    The board is paused then, and could read a byte of the frame as the letter S (start).
+    After the boot, the board is paused. It could read a byte of a motion frame as the letter S
+    (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()

@@ -198,9 +198,9 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """A goal that an event such as a reset or an e-stop has discarded is not driven to later.
+    """An event such as a reset or an e-stop discards the goal, and the robot stops.
 
-    The robot rests until a new goal arrives.
+    The robot does not drive to this goal later. It rests until a new goal arrives.
     """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)

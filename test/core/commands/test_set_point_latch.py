@@ -26,9 +26,10 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """An e-stop during a change of the commanding topic is sent alone.
+    """The e-stop is latched when another topic has just begun to command the robot.
 
-    The change's Stop and the new topic's command are not sent.
+    The driver sends only the e-stop. It sends neither the Stop between the two topics nor the
+    command of the new topic.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -81,7 +82,7 @@ def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
 
 
 def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stream) -> None:
-    """After the release of the e-stop, the driver sends only Stop, not the command from before."""
+    """A user latches the e-stop during a drive, and releases it. Then only Stop is sent."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.1)

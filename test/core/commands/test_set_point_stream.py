@@ -123,10 +123,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """After a letter, such as S (start), during a drive, the command is sent again.
+    """After a letter, such as S (start), during a drive, the driver sends the command again.
 
-    Zeros before the letter may complete a broken frame to a wrong command, which the repeated
-    command replaces.
+    Zeros are sent before a letter. If the last frame has lost its end, these zeros may complete it
+    to a wrong command. The repeated command replaces the wrong one.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -211,9 +211,9 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A motion is halted, so Stop is due. Before Stop is sent, the driver discards it.
+    """A motion is halted, so the driver must send Stop. Before it does, it discards all commands.
 
-    Afterwards, the driver writes nothing.
+    Afterwards, the driver writes nothing, not even this Stop.
     """
     order(stream, GO, 1.0)
     stream.halt(1.0)
@@ -247,7 +247,8 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
 ) -> None:
     """In any order of commands, stops, e-stops and releases, only fresh commands are sent.
 
-    None is sent during an e-stop, and a Stop lies between the commands of two topics.
+    While the e-stop is latched, no command is sent. Between the commands of two topics, a Stop is
+    sent.
     """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""

@@ -23,7 +23,7 @@ def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
 ) -> None:
     """At shutdown, the driver first writes Stop three times, then what ``on_exit`` demands.
 
-    For a pause or a reset, this is Stop and its letter.
+    For a pause, this is Stop and the letter P; for a reset, Stop and the letter R.
     """
     assert bench.last_words(on_exit) == 3 * STOP + expected
 

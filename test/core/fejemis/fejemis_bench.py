@@ -156,7 +156,10 @@ class Bench:
         return [e.value for e in self.events if isinstance(e, Extra) and isinstance(e.value, kind)]
 
     def lines(self, channel: int, since: float = -math.inf) -> list[str]:
-        """Return the lines written to a channel since ``since``, without checksums and padding."""
+        """Return the lines written to a channel, without checksums and padding.
+
+        ``since``: time in s before which lines are left out.
+        """
         text = b"".join(d for at, to, d in self.written if to == channel and at >= since)
         found = text.decode("ascii").split("\n")
         bare = [line[3:] if line.startswith(";") else line for line in found]

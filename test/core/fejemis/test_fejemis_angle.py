@@ -74,7 +74,10 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 
 @pytest.mark.parametrize("first", [DRIVE, FRONT])
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
-    """After 80 ms without reads, a refusal names the computer until the front board is read."""
+    """The driver reads nothing for 80 ms, and then reads the two boards one after the other.
+
+    A refusal names the computer as the cause until the front board is read.
+    """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}
     for _ in range(round(0.08 / bench.robot.tick_s)):

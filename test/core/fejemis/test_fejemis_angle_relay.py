@@ -45,9 +45,10 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """The checksum detects the loss of two characters, except in an angle to the right with a 6.
+    """If a line with an angle loses two characters, the checksum usually detects this.
 
-    Then the board reads an angle that is 0° to 10° to the left.
+    It may miss the loss only in an angle to the right whose text contains a 6. The board then reads
+    an angle that is 0° to 10° to the left.
     """
     across = 0
     for angle_deg in EVERY:
@@ -64,9 +65,9 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """From a line with a checksum that lost one or two characters, no different angle is read.
+    """A line with an angle and a checksum loses one or two characters.
 
-    This is true even for the most tolerant parser.
+    No wrong angle is then read from the line, even by the most tolerant parser.
     """
     text = relayed(angle_deg)
     data = line(text, sums=True)
@@ -78,7 +79,8 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
     """The text of an angle from −60° to −69° contains ``-`` and ``6``, in whatever form.
 
-    Their codes add up to 99, so the checksum, modulo 99, misses the loss of both.
+    The codes of these two characters add up to 99. So the checksum, which is modulo 99, does not
+    detect that both are lost.
     """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
@@ -104,7 +106,7 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """From a line without a checksum that lost up to three characters, no angle beyond 90° is read.
+    """A line without a checksum loses up to three characters. No angle beyond 90° is read from it.
 
     Beyond 90°, the inner wheel would be faster than the outer one.
     """
@@ -123,10 +125,10 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 def test_no_sequence_of_angles_makes_the_board_read_more_than_90_degrees(
     angles_deg: list[float],
 ) -> None:
-    """For any sequence of angles, the board reads no angle beyond 90°, even after a loss.
+    """For any sequence of angles, the board reads no angle beyond 90°, even if characters are lost.
 
-    * With a checksum: of two characters, if the checksum does not detect the loss.
-    * Without a checksum: of one character.
+    * With a checksum: two characters are lost, and the checksum does not detect this.
+    * Without a checksum: one character is lost.
     """
     summed, plain = AngleRelay(), AngleRelay()
     for angle_rad in map(math.radians, angles_deg):

@@ -83,9 +83,10 @@ def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """A comparison of ``confs`` with ``conf`` shows the order of track width and wheelbase.
+    """The driver must find the order in which ``confs`` contains track width and wheelbase.
 
-    ``confs`` contains both, and ``conf`` the track width.
+    Another message of the board, ``conf``, has the track width, but not the wheelbase. The driver
+    compares the two messages.
     """
     for turned in (False, True):
         configuration = Configuration("drive", {})
@@ -276,7 +277,7 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """Motion is refused until the board has all settings that the user has set.
 
-    A lost line of a setting is not repeated during a drive.
+    If the line of a setting is lost, the driver does not repeat it during a drive.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

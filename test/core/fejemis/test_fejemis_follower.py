@@ -44,7 +44,10 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """A front wheel that must turn back half way to its angle causes no fault."""
+    """The front wheel is commanded back before it has reached its angle. No fault is reported.
+
+    The time limit begins again as soon as the wheel approaches its new angle.
+    """
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))

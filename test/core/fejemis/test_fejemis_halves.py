@@ -213,10 +213,10 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 def test_the_stop_for_boards_that_are_no_pair_is_not_repeated_for_ever(
     ids: tuple[int, int], speaks: set[int], *, estop: bool
 ) -> None:
-    """If one board is silent or both are drive boards, Stop is repeated less often after 5 s.
+    """One board is silent, or both are drive boards. After 5 s, Stop is repeated less often.
 
-    It then comes with each try to start the boards, twice a second; during an e-stop, 20 times a
-    second.
+    Stop is then sent with each try to start the boards, twice a second. While the e-stop is
+    latched, it is still sent 20 times a second.
     """
     bench = Bench(Simulated(ids=ids))
     bench.speaks = speaks

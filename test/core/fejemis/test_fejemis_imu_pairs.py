@@ -31,7 +31,8 @@ Valid for reads at most 100 ms apart.
 class Line:
     """A line that the board sends at ``sent_s``.
 
-    ``number``: number of the IMU sample in the same cycle of the board.
+    ``number``: number of the IMU sample that the board takes in the cycle in which it sends the
+    line.
     """
 
     sent_s: float
@@ -280,13 +281,13 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lost, repeated and late lines give false pairs only if the stream hides the mistake.
+    """Lines of two samples are paired only if nothing in the stream shows the mistake.
 
-    In such a pair, one line is read late, the other less than 5 ms later, and no pose follows in
-    the same read.
+    Lines are lost, repeated or late. The mistake is hidden if the first line of the pair is late,
+    the second is read less than 5 ms later, and no pose follows in the same read.
 
-    ``period_s``: period of the reads in s, which must differ from the samples' period; None: each
-    line is read at once.
+    ``period_s``: period of the reads in s, which must differ from the period of the samples. None:
+    each line is read as soon as it arrives, except while the host is busy.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
@@ -301,7 +302,8 @@ def test_no_pair_has_lines_of_two_samples(
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """No sample after a silence of the drive board gets a stamp from before the silence.
 
-    Samples before the first pose have no known time, and are not published.
+    Samples that arrive before the first pose after the silence have no known time, and are not
+    published.
     """
     bench = nominal()
     for phase_s in (0.0, 0.005, 0.01, 0.015):

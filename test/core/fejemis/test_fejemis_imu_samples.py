@@ -48,7 +48,8 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
     """Two late samples do not shift the sampling times of the next ones.
 
-    If a sample were lost before the third, the third would be 3 ms early, which is impossible.
+    The driver could assume a lost sample instead. But then the third sample would have arrived 3 ms
+    before the board took it, which is impossible.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}
     arrivals = [0.01 * number + late_s.get(number, 3e-4) for number in range(600)]
@@ -57,9 +58,10 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 
 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
-    """A sample that seems early cancels only the last of several supposed losses.
+    """The driver has counted several samples as lost that may only have been late.
 
-    Otherwise the stamps would be several periods too old.
+    A sample arrives earlier than this count permits. The driver reduces the count only as far as
+    necessary. Otherwise the stamps would be several periods too old.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []
@@ -152,7 +154,7 @@ def numbered() -> Bench:
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
     """Return, for each published sample, the cycles of its gyro line and its acceleration line.
 
-    Values of a bench from ``numbered``: the cycle divided by 1000.
+    The bench must be from ``numbered``. Each cycle is returned as its number divided by 1000.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

@@ -179,7 +179,7 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line that lost its end is discarded with the next line, as one fault.
+    """A line loses its end. The decoder discards it with the next line, as one fault.
 
     A line with a wrong checksum is a fault, too.
     """
@@ -262,7 +262,8 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
     """The first heartbeat shows whether the board's lines have checksums.
 
-    If they have checksums, the decoder discards lines without one; if not, lines with one.
+    If it has a checksum, the decoder discards lines without checksums. If it has none, the decoder
+    discards lines with checksums.
     """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
@@ -316,9 +317,10 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """The decoder soon accepts lines that the firmware prints with other decimals than before.
+    """The firmware begins to print a kind of line with another number of decimals.
 
-    The first two are discarded. If a kind of line varies all the time, all forms are accepted.
+    The decoder discards the first two such lines as damaged, and accepts the next ones. If the
+    number of decimals varies all the time, all lines of this kind are accepted.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
@@ -330,10 +332,10 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """The eighth line with another form in a window of 24 lines of a kind is accepted.
+    """In each window of 24 lines of a kind, the decoder counts the lines whose form differs.
 
-    The first seven are discarded as damaged, also in the next window. ``windows``: number of
-    earlier windows without such lines.
+    The first seven such lines in a window are discarded as damaged; the eighth is accepted.
+    ``windows``: number of earlier windows in which no form differs.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

@@ -20,7 +20,7 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The driver sends a lift voltage with a time limit. Then the front board receives no line.
+    """The driver sends a lift voltage with a time limit. Later lines do not reach the front board.
 
     The lift stops by itself when the time limit is over.
     """
@@ -46,9 +46,9 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Of a thousand lift voltages or colours within 1 s, only about twenty are sent.
+    """The user commands a thousand lift voltages and colours in 1 s. About twenty of each are sent.
 
-    Each is the newest. A voltage of 0 is sent at once.
+    The driver always sends the newest value. It sends a voltage of 0 at once.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -184,7 +184,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
     """The last lines of the guard and of the driver stop wheels, brush and lift.
 
-    The guard has lines with and without a latched e-stop.
+    The guard has two sets of last lines: one for a latched e-stop, and one without it.
     """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()

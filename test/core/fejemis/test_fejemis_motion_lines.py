@@ -67,7 +67,7 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 
 @pytest.mark.slow
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """From a line that lost one or two characters, the board reads no wrong motion.
+    """A motion line loses one or two characters. The board reads no wrong motion from it.
 
     If the line end is lost, the board reads this line and the next as one.
     """
@@ -110,10 +110,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """No false motion is read if a stop line, ``rc 2 0 0``, and the next line lose two characters.
+    """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
 
-    The driver writes an empty line between them. Otherwise the next line's checksum, for example
-    92, could become a number: ``rc 2 0 092``.
+    The driver writes an empty line between the two lines. Otherwise the checksum of the second
+    line, for example 92, could continue a number of the stop line: ``rc 2 0 092``.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -173,9 +173,9 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     "volts", [6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25, 1.99, 1.999, -0.1995, -0.1999]
 )
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """A lift line that lost one or two characters drives the lift no harder and no longer.
+    """A lift line loses one or two characters. It then drives the lift no harder and no longer.
 
-    The line commands 45 to 100 % of the requested voltage.
+    The complete line commands 45 to 100 % of the requested voltage.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -221,9 +221,10 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 @pytest.mark.slow
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """Without a checksum, only the loss of a point or a digit makes the outer wheel faster.
+    """A motion line without a checksum loses one character.
 
-    Only the loss of the minus sign reverses the wheel. One character of the line is lost.
+    The outer wheel becomes faster only if a point or a digit is lost. It is reversed only if the
+    minus sign is lost.
     """
     thousandths = [*range(1, 1100), *range(3000, 21_000, 1000)]
     for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):

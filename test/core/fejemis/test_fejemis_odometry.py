@@ -135,8 +135,8 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 def test_two_different_false_poses_in_a_row_move_nothing() -> None:
     """Two different false poses in a row do not move the odometry.
 
-    The robot could have driven to both, but the wheel speeds contradict the motion to the first
-    pose and the motion between the poses.
+    The robot could have driven to each of these poses. But the wheel speeds contradict both the
+    motion to the first pose and the motion from the first to the second.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)

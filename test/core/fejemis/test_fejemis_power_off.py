@@ -53,9 +53,10 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 @pytest.mark.parametrize("closes", [False, True])
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
-    """A ~/start makes a pending power off of silent boards fail, but is not confirmed itself.
+    """After a request to power off, the boards become silent. Then the user calls ~/start.
 
-    ``closes``: whether the ports close right after the call.
+    The power off fails, but this does not confirm ~/start. ``closes``: whether the ports close
+    right after the call of ~/start.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)

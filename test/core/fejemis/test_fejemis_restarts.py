@@ -40,7 +40,7 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
     """If one read contains a pose and then the report of a restart, the pose is handled first.
 
-    The board's clock is reset afterwards.
+    Afterwards, the driver resets its estimate of the board's clock.
     """
     bench = nominal()
     drive = bench.robot.drive
@@ -140,7 +140,8 @@ def test_a_restart_while_the_port_is_away_is_noticed_even_if_the_uptime_has_grow
 def test_a_restart_is_noticed_although_the_computer_stalled_while_the_port_was_away() -> None:
     """A restart while the port is away is detected despite a stall, and the odometry does not jump.
 
-    The stall ended before the port was back, so it does not explain the board's small time.
+    After the restart, the board's time is smaller than expected. The stall does not explain this,
+    because it ended before the port was back.
     """
     bench = nominal()
     bench.drive_on(0.3, 0.0, 3.0)

@@ -58,8 +58,8 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The odometry contains the whole motion of a drive during a stall of the driver.
 
-    After an unnoticed stall, lines over 1 s late are rejected. The first displacement then covers
-    seconds, and is not implausible.
+    If the driver does not notice the stall, it rejects the lines that are over 1 s late. The first
+    displacement afterwards covers several seconds. The driver does not reject it as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -79,7 +79,8 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
     """After a stall, all samples in the terminal's buffer are published with their sampling times.
 
-    The buffer holds the lines of 0.37 s, or all lines.
+    In one case, the buffer is full after 0.37 s. In the other case, it holds all lines of the
+    stall.
     """
     bench = nominal()
     bench.run(1.0)
@@ -97,7 +98,8 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """After a stall and a second late read, the published samples have their sampling times.
 
-    Bytes are lost between the reads. Only a sample between them and the next pose is not published.
+    Bytes are lost between the two reads. Only a sample between the lost bytes and the next pose is
+    not published.
     """
     bench = nominal()
     bench.run(1.0)

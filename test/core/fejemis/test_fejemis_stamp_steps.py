@@ -30,9 +30,9 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 17])
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
-    """Stamps of a kind increase in nanoseconds, even if a restart of the boards is read late.
+    """Stamps of a kind, in nanoseconds, always increase, even if a restart is read late.
 
-    The first lines after such a restart all have the time of the read.
+    The first lines after such a restart of the boards all have the time of the read.
     """
     chance = random.Random(seed)
     bench = Bench()

@@ -21,7 +21,8 @@ def without_relays(lines: list[str]) -> list[str]:
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
     """An e-stop stops both boards, but its release sends ``start`` to the drive board only.
 
-    Stop comes first, because some firmware resumes the old motion after ``start``.
+    Before ``start``, the driver sends Stop, because some firmware resumes the old motion after
+    ``start``.
     """
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()

@@ -121,9 +121,9 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 
 
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
-    """Damaged times that are 0.1 s too large, every third time, do not move the clock.
+    """Every third time of the board is damaged and 0.1 s too large. The clock does not move.
 
-    The correct times between them show that the board's time has not jumped.
+    The correct times between the damaged ones show that the board's time has not jumped.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -173,7 +173,8 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
     """Stamps of extra readings must increase only within a kind.
 
-    An earlier stamp of another kind stays; an equal stamp of the same kind becomes later.
+    If a stamp equals the last one of its kind, it becomes 1 µs later. A stamp before that of
+    another kind is not changed.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):

@@ -42,7 +42,8 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 ) -> None:
     """The body twist is computed from wheel rates with the odometry matrix of the manual.
 
-    Only the manual's form with 1/(2 cos 30°) is right; the other gives 3/4 of the velocity along x.
+    The manual has two forms of this matrix. Only the form with 1/(2 cos 30°) is right; with the
+    other form, the velocity along x would be 3/4 of the true one.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258

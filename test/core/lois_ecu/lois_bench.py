@@ -31,7 +31,8 @@ class Bench(AnyBench):
 
     ``steps``: encoder ticks of one turn of a wheel.
 
-    ``own_periods``: whether the board keeps its own periods, if ``settings`` has none.
+    ``own_periods``: whether the board keeps its own periods of the reports, if ``settings`` has
+    none.
     """
 
     def __init__(

@@ -191,7 +191,7 @@ class Rig:
 
     ``reads_s``: least and greatest time between two reads of the driver, in s.
 
-    ``own_periods``: whether the board keeps its own periods, if ``ours`` has none.
+    ``own_periods``: whether the board keeps its own periods of the reports, if ``ours`` has none.
     """
 
     def __init__(

@@ -49,7 +49,7 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
     ],
 )
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """The covariance fits the pose error of wheels of wrong sizes that slip on uneven ground.
+    """The wheels have wrong sizes and slip on uneven ground. The covariance fits the pose's error.
 
     At the limit of this test, only one in 10,000 drives fails by chance.
     """

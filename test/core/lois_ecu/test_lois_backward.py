@@ -80,9 +80,10 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -
 
 
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
-    """A wheel that was found at rest is not assumed to roll because the board's heading differs.
+    """The odometry has found that a wheel is at rest, but the board's heading shows a turn.
 
-    The board's heading is wrong: the board computes it from the old speed of this wheel.
+    The board computes its heading from the old speed of this wheel, so the heading is wrong. The
+    odometry does not assume that the wheel rolls.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)
@@ -103,9 +104,9 @@ def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_compute
 
 @pytest.mark.parametrize(("name", "seed"), [("straight back", 9025), ("curve back", 9013)])
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """After a backward drive with the user's gains, the position is right within 10 %.
+    """After a backward drive with the user's gains, the error of the position is small.
 
-    The error is below 10 % of the distance, although wheels overshoot or roll too fast.
+    It is below 10 % of the distance, although wheels overshoot or roll too fast.
     """
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m

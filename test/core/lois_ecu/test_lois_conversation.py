@@ -73,9 +73,9 @@ def test_a_restarted_board_is_configured_again() -> None:
 
 @pytest.mark.slow
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
-    """Tick counters that begin at zero again show a restart that is too fast for a silence.
+    """A board restarts so fast that no silence shows it, but its tick counters begin at zero again.
 
-    The driver then configures the board again.
+    The driver notices the restart by the counters, and configures the board again.
     """
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
@@ -137,7 +137,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    The public firmware counts no ticks in a backward drive, so they prove nothing after it.
+    The public firmware counts no ticks in a backward drive. After such a drive, they prove nothing.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -175,7 +175,7 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 @pytest.mark.slow
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """Without RPM 0/0 after a Stop, a slower set-point does not start the wheels.
+    """After a Stop without RPM 0/0, a slower set-point than before does not start the wheels.
 
     The firmware still uses the last measured speed, which is higher. Without feed-forward, the
     wheels then get no power.
@@ -215,7 +215,7 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
     """A record that is requested while the wheels turn is delivered with all its samples.
 
-    The driver knows the unit of the times in it, which depends on the firmware.
+    The driver knows the unit of the times in the record, which depends on the firmware.
     """
     rig = Rig(nominal(firmware))
     rig.run(4.0)
@@ -237,7 +237,7 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("loss", "outcome"), [(0.0, RecordReading), (0.004, RecordFailed)])
 def test_ticks_after_a_record_are_not_taken_for_late(loss: float, outcome: type) -> None:
-    """The tick reports after a record are not regarded as late, even if lines of it are lost.
+    """Tick reports after a record are not regarded as late, even if lines of the record are lost.
 
     The public firmware's clock stops for 0.12 s during a record; ``odom`` must not jump later.
     """

@@ -217,8 +217,8 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
     """The decoder drops a report whose tick counts jump, and returns the next report.
 
-    If the next report continues from before the jump, only the dropped report was wrong. If it
-    continues from after the jump, the board has restarted.
+    If the next counts continue the counts before the jump, only the dropped report was wrong. If
+    they continue the counts after the jump, the board has restarted.
     """
     decoder = LoisDecoder()
     said = [

@@ -38,10 +38,10 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 @pytest.mark.slow
 @FIRMWARE
 def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -> None:
-    """After a change to duty mode in a forward drive, odometry follows a backward drive.
+    """The user changes to duty mode in a forward drive, and then drives backward.
 
-    The driver clears the RPM target of the forward drive. While it is positive, the public firmware
-    counts all ticks as forward.
+    The odometry follows the backward drive, because the driver clears the RPM target of the forward
+    drive. While this target is positive, the public firmware counts all ticks as forward.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -55,9 +55,9 @@ def test_backward_duty_after_a_forward_drive_is_backward_motion(firmware: str) -
 
 
 def test_a_lower_max_duty_stops_a_robot_that_is_driven_by_duties() -> None:
-    """A lower ``max_duty`` stops a robot that is driven by duties.
+    """The user lowers ``max_duty`` while the robot is driven by duties. The driver stops the robot.
 
-    After a higher ``max_duty``, the earlier command does not move the robot again.
+    When the user raises ``max_duty`` later, the earlier command does not move the robot again.
     """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty", max_duty=60))
     bench.drive_on(0.3, 3.0)
@@ -86,9 +86,9 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 
 
 def test_the_robot_is_stopped_between_a_topic_of_this_board_and_wheel_cmd() -> None:
-    """A topic that only this board has commands wheel rates; then ``wheel_cmd`` does.
+    """Wheel rates come from a topic that only this board has, and then from ``wheel_cmd``.
 
-    Stop is sent in between, as for every change of the topic.
+    The driver sends Stop in between, as for every change of the commanding topic.
     """
     bench = Bench("documented", LoisEcuSettings(drive_mode="duty"))
     own = Enum("own", {"DUTY": "duty_cmd"}).DUTY  # type: ignore[attr-defined]

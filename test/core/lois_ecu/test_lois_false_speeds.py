@@ -85,9 +85,10 @@ def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
 
 
 def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
-    """Odometry does not move a resting wheel by a turn that the board computes from an old speed.
+    """The board computes a turn from the old speed of a wheel that is at rest.
 
-    The board still holds 11 RPM for the left wheel when the right wheel starts.
+    The odometry does not move this wheel. The board still holds 11 RPM for the left wheel when the
+    right wheel starts.
     """
     reports = Reports()
     reports.order(-12, 12)

@@ -67,9 +67,10 @@ def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
 
 @pytest.mark.slow
 def test_settings_that_a_busy_computer_writes_together_reach_the_board() -> None:
-    """All settings reach the board, although a busy computer sends each round without a pause.
+    """All settings reach the board, although a busy computer sends many lines without a pause.
 
-    Only the last line of a round requests a date: the board receives nothing while it sends a date.
+    The driver sends the settings in several rounds. Only the last line of a round requests a date,
+    because the board receives nothing while it sends a date.
     """
     writer, robot = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS)), LoisRobot("firmware")
     writer.begin(0.0)
@@ -155,7 +156,7 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 
 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
-    """A Stop in the other form of lines is never in the same write as a setting.
+    """The driver also sends Stop without a checksum, but never in one write with a setting.
 
     If both lines lost characters, the rest could command full duty.
     """

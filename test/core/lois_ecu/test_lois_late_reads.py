@@ -54,7 +54,10 @@ def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows()
 
 
 def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
-    """If the reports cover only the first second of a 5 s delay, the buffer was full afterwards."""
+    """A read that is 5 s late contains the reports of only 1 s: the buffer was full afterwards.
+
+    These reports get times at the beginning of the delay.
+    """
     late_reads = listening()
     found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
     assert found[:-1] == about(2.0, 2.2, 2.4, 2.6)
@@ -108,7 +111,7 @@ def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
 
 
 def test_the_clock_after_a_restart_is_not_slowed_by_sending() -> None:
-    """The public firmware's clock does not run while the board sends: 200 ms take 218 ms.
+    """While the public firmware sends, its clock does not run: 200 ms of the clock take 218 ms.
 
     While the board boots, it sends nothing. So its clock then shows the true time.
     """

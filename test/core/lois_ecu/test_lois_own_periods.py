@@ -116,7 +116,7 @@ def test_a_curve_and_a_turn_are_within_3_sigma(firmware: Firmware, name: str) ->
 def test_a_stop_is_proved_by_the_ticks_and_then_the_line_is_quiet(firmware: str) -> None:
     """After the last command, ticks prove the standstill within 2.5 s; later, the line is quiet.
 
-    After 5 s, the driver would end without a proof.
+    Without this proof, the driver would repeat Stop for 5 s.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(4.0)

@@ -161,9 +161,10 @@ FAST_TICKS = 30
 
 
 def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
-    """Return a translation after two fast wheels have rolled forward 600 ticks, then ``steps``.
+    """Return a ``Translation`` of the reports of two fast wheels.
 
-    ``steps``: what each report then adds to the counts of the left and the right wheel.
+    Both wheels first roll forward by 20 reports of ``FAST_TICKS`` each. ``steps``: what each later
+    report adds to the counts of the left and the right wheel.
     """
     settings = LoisEcuSettings(wheel_radius_m=0.03, drive_mode="duty", duty_scale=100.0)
     translation, counts, now = Translation(settings), [0, 0], 0.0
