@@ -34,5 +34,8 @@ def printing() -> Iterator[None]:
 
 
 def discard_output() -> None:
-    """Discard all further output. Otherwise Python fails to write the rest when it ends."""
+    """Discard all further output.
+
+    Otherwise, Python would try to write the remaining output at its end, and fail.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -65,7 +65,7 @@ class Motor:
         return self._through_gap(turns) if settings.backlash_turns else turns
 
     def _prepare(self, dt_s: float) -> None:
-        """Calculate the coefficients of steps of ``dt_s``."""
+        """Calculate the coefficients with which ``advance`` simulates a step of ``dt_s``."""
         settings, self._step_s = self._settings, dt_s
         self._part = 1 - exp(-dt_s / settings.time_constant_s)
         if settings.second_time_constant_s:
@@ -117,8 +117,8 @@ class Encoder:
     def turn(self, turns: float) -> list[tuple[float, bool, int]]:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
-        An edge has its time as a fraction of the step, whether a long level ended, and 1 (forward)
-        or -1.
+        An edge is a tuple of its time as a fraction of the step, whether a long level ended at it,
+        and its direction: 1 forward, -1 backward.
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
@@ -142,7 +142,7 @@ class Encoder:
         ]
 
     def _place(self, edge: int) -> float:
-        """Return the position of an edge, in periods of the disc."""
+        """Return the position of edge number ``edge``, in periods of the disc."""
         return edge // 2 + (self._short if edge % 2 else 0.0) + self._off[edge % len(self._off)]
 
     def _level(self, periods: float) -> int:
@@ -157,8 +157,8 @@ class Gains:
     """Gains of the manual's speed controller.
 
     * ``feed_forward``: in percent of duty per RPM.
-    * ``low_pass``: 0..1. In each step, the controller's target changes by this part of its
-      difference to the commanded target.
+    * ``low_pass``: 0..1. In each step, the controller's own target moves towards the commanded
+      target by this fraction of the distance between them.
     """
 
     kp: float
@@ -169,10 +169,10 @@ class Gains:
 
 
 class SpeedController:
-    """The board's speed controller, with measured and target RPM as input and a duty as output.
+    """The board's speed controller. It calculates a duty from the measured and the target RPM.
 
-    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule for
-    ``NOMINAL_STEP_S``, even if the true step differs.
+    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule. The rule assumes
+    steps of ``NOMINAL_STEP_S``, even if the true steps differ.
     """
 
     def __init__(self, gains: Gains) -> None:

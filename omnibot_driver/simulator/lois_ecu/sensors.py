@@ -31,8 +31,8 @@ class Fix:
 def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> Fix:
     """Return the fix ``x_m`` east and ``y_m`` north of ``start`` (latitude, longitude in degrees).
 
-    ``utc_s``: time in s since 2000-01-01, in years of 365 days and months of 31 days (December:
-    24).
+    ``utc_s``: time in s since 2000-01-01. In the simulated calendar, a year has 365 days and a
+    month has 31 days, except December, which has 24.
     """
     latitude = start[0] + y_m / METRES_PER_DEGREE
     longitude = start[1] + x_m / (METRES_PER_DEGREE * cos(radians(start[0])))
@@ -53,7 +53,8 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether the numbers are averaged as they are; 359 and 1 then give 180.
+    ``over_north``: whether the mean ignores that 359 and 0 are adjacent. The mean of 359, 1 and 0
+    is then 120.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

@@ -23,11 +23,11 @@ class Quirks:
       equal.
     * ``velocity_may_be_nan``: two ticks in one timer count give NaN or infinity in 0x20.
     * ``sign_of_command``: the measured speed has the sign of the target.
-    * ``duty_drags_target``: at a commanded negative duty, each tick lowers an RPM target of 0 or
-      less by 1. Requires ``ticks_of_forward_targets``.
-    * ``reverse_runs_fast``: at a negative duty of the controller, each tick lowers an RPM target of
-      0 or less by 1. The controller's next step uses the lower target, then restores the target.
-      Requires ``ticks_of_forward_targets``.
+    * ``duty_drags_target``: while a negative duty is commanded, each encoder tick lowers an RPM
+      target of 0 or less by 1. Requires ``ticks_of_forward_targets``.
+    * ``reverse_runs_fast``: while the controller's duty is negative, each encoder tick lowers an
+      RPM target of 0 or less by 1. The controller's next step uses the lower target, then restores
+      the target. Requires ``ticks_of_forward_targets``.
     * ``low_pass_starts_at_zero``: wheels ignore RPM targets until 0x23 is written.
     * ``extra_settings``: the settings 0x21 to 0x23 exist.
     * ``appends_odometry``: 0x12 sends the odometry after the ticks, with command number 0x12.

@@ -16,7 +16,7 @@ INPUT_DEPTH = 600
 class Uart:
     """The serial port.
 
-    * ``loses``: whether only the first of the bytes that arrive while interrupts are off is kept.
+    * ``loses``: whether the board keeps only the first byte that arrives while interrupts are off.
     * ``input``: characters that were received but not read yet.
     """
 
@@ -56,7 +56,7 @@ class Uart:
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
-        """Simulate an interrupt of 0.2 ms: the next ``listen`` loses a character."""
+        """Simulate an interrupt of 0.2 ms: the next ``listen`` loses its second character."""
         self._misses = True
 
     def listen(self) -> int:

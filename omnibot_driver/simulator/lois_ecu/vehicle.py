@@ -42,8 +42,9 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: for each encoder, the board's factors for short and long levels. The simulated
-    levels fit these factors exactly.
+    ``corrections``: for each encoder, the factors by which the board multiplies the durations of
+    short and of long levels. The simulated levels have the lengths for which these factors are
+    exact.
     """
 
     def __init__(

@@ -149,8 +149,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    The error of the server is reproduced: the distance of acceleration and deceleration is added in
-    feet.
+    The server has an error, which is simulated: it adds the distance of acceleration and
+    deceleration in feet to a distance in inches.
     """
     if motion.kind not in _TIMED:
         return 0.0

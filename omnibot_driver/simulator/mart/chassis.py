@@ -12,8 +12,8 @@ from omnibot_driver.simulator.mart.settings import MartSettings, Stuck
 STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
-"""Number of updates of the applied effort per second. Each changes the effort by at most the set
-acceleration."""
+"""Number of updates of the applied effort per second. Each update changes the effort by at most the
+set acceleration."""
 STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 

@@ -80,9 +80,9 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _refuses_left_spin(server: "MartServer") -> bool:
-    """Return whether the server refuses the spin L, because of a motion, a recording or MCS.
+    """Return whether a motion, a recording or MCS prevents the spin L.
 
-    With the quirk ``left_spin_in_reference_move``, the forward drive RM is not a reason.
+    With the quirk ``left_spin_in_reference_move``, the forward drive RM does not prevent the spin.
     """
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict

@@ -11,8 +11,8 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    * ``alive``: whether the IMU is plugged in; set by the caller. The settings can also plan a
-      failure.
+    * ``alive``: whether the IMU is plugged in, as set by the caller. A failure that the settings
+      plan does not change this value.
     * ``closed``: whether the server has stopped using the IMU (until RST IMU or SB succeeds).
     * ``rate_dps``: last turn rate in degrees/s, minus the bias that the server knows.
     * ``heading_deg``: the relative heading in degrees, positive to the left.
@@ -64,8 +64,8 @@ class Imu:
     def drift(self, now: float, *, integrates: bool) -> None:
         """Advance to ``now``. The robot has been at rest since the previous sample.
 
-        ``integrates``: whether the heading drifts at the part of the gyro's bias that the server
-        does not know.
+        ``integrates``: whether the heading changes in this time. The rate of change is the gyro's
+        bias minus the bias that the server knows.
         """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)

@@ -2,9 +2,9 @@
 
 """The start of each kind of motion, and its end by a command.
 
-A start or an end has several steps. Each step is a function that the server calls later with itself
-as an argument, so a copy of the server can continue. This module does not know the words of
-commands.
+A start or an end has several steps, each of which is a function. The server calls each function
+with itself as an argument, so a copy of the server can continue what the original has begun. This
+module does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING

@@ -33,11 +33,11 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", motion: Motion) -> bool:
-    """Stop a drive (F, B, RM) or a spin (R, L). Return whether the caller must wait for its end.
+    """Stop a drive (F, B, RM) or a spin (R, L). Return whether to wait for the end of the motion.
 
-    * A motion that is already stopping is not stopped again. The result is True for a drive, and
-      False for a spin.
-    * A drive that the module ``alarms`` no longer watches is not stopped. The result is False.
+    * A motion that is already stopping is not stopped again. The result is then True for a drive,
+      and False for a spin.
+    * A drive that the module ``alarms`` no longer watches is not stopped. The result is then False.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

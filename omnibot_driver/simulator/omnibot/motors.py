@@ -23,8 +23,8 @@ STICKING_SPEED = 0.3
 class MotorConstants:
     """Properties of one motor.
 
-    * ``pwm_per_count``: PWM steps for a speed of one count per tick. For the default, the manual's
-      feed-forward gives seven eighths of the effort.
+    * ``pwm_per_count``: effort in PWM steps for a speed of one count per tick. The manual's
+      feed-forward of 40 is seven eighths of the default.
     * ``time_constant_ticks``: time constant of the speed.
     * ``delay_ticks``: delay from an effort to its effect.
     """
@@ -57,7 +57,8 @@ class Motor:
         self._on_the_way = deque([0.0] * constants.delay_ticks)
         self.speed = 0.0
         self.position = 0.5
-        """Counts turned so far, not rounded. The wheel starts in the middle of an encoder step."""
+        """Position in encoder counts, not rounded. It starts at 0.5, the middle of an encoder
+        step."""
 
     @property
     def encoder(self) -> int:

@@ -51,9 +51,9 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does, but discard FF and a next byte other than FE.
+    """Find frames as ``counting`` does, but discard an FF and the next byte if this is not FE.
 
-    The header in the bytes FF FF FE is therefore missed.
+    So the header in the bytes FF FF FE is missed.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
@@ -107,7 +107,7 @@ class CommandReceiver:
     """The receiver from one power-up to the next.
 
     * ``held``: received bytes that may be the beginning of a frame.
-    * ``last_at_s``: arrival time of the last byte while control frames were accepted.
+    * ``last_at_s``: arrival time of the last byte that came while control frames were accepted.
     * ``to_swallow``: number of bytes that are lost before the receiver is awake.
     """
 

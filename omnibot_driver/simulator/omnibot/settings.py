@@ -36,8 +36,8 @@ class BoardSettings:
     * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
     * ``position_scale``: LSB per m.
     * ``heading_scale``: LSB per rad of an unwrapped heading.
-    * ``estop_latches``: whether an emergency stop lasts until a reset, or until the next motion
-      command.
+    * ``estop_latches``: whether an emergency stop lasts until a reset; otherwise, it lasts until
+      the next motion command.
     * ``axis_signs``: signs of the board's x, y and yaw relative to REP-103.
     * ``motor_wiring``: for each controller, the number of its motor, 1 to 3; negative if the
       motor's poles, but not its encoder, are swapped.

@@ -15,12 +15,12 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Smallest number of averages from which an Allan deviation is computed. So the longest averaging
-time is one ninth of the recording."""
+"""Smallest number of successive averages of the readings from which an Allan deviation is computed.
+So the longest averaging time is one ninth of the recording."""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 58.0
-"""Shortest recording, in s, from which bias instability and random walk are estimated: a minute in
-which some readings are missing."""
+"""Shortest recording, in s, from which bias instability and random walk are estimated. It is a
+little less than a minute, because some readings may be missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +86,7 @@ def allan(readings: Column, period_s: float) -> Allan:
 def noise(curve: Allan) -> Noise:
     """Return the noise terms that fit the Allan deviations in ``curve`` best.
 
-    If the recording is shorter than a minute (``WALK_FROM_S``), only white noise is fitted.
+    If the recording is shorter than 58 s (``WALK_FROM_S``), only white noise is fitted.
     """
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]

@@ -19,7 +19,8 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter that only a board with records of encoder ticks and settable gains has."""
+"""Name of a parameter that exists only if the board records encoder ticks and its gains can be
+set."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -33,8 +34,8 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand: driver parameters of which the board must have at least one, and the name of
-this requirement for the error message."""
+"""For each subcommand: names of parameters, of which the driver must have at least one, and a text
+that describes this requirement in the error message."""
 
 
 def require_able(subcommand: str, parameters: Mapping[str, object]) -> None:

@@ -28,8 +28,8 @@ REQUESTS: Final = 3
 """Number of times that the tool sends a request that may be repeated. The middleware drops an
 answer if the driver discovers the new client too late."""
 SPIN_S: Final = 0.005
-"""Time, in s, for which each call of the executor waits. With different times on a busy computer,
-rclpy does not handle the messages of the e-stop."""
+"""Time, in s, for which each call of the executor waits. All calls use the same time. If the times
+differed, rclpy would not handle the messages of the e-stop on a busy computer."""
 
 
 class Client:

@@ -143,7 +143,8 @@ class Walk:
         again = drift(log.odometry, began_s + SETTLING_S, began_s + JOG_S)
         right = frame == "wheel_counts" or frame_is_right(fast, again, turned_rad)
         found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
-        verdict = "as set" if right else f"not {frame}: the odometry shows it in a wrong direction"
+        wrong = f"not {frame}: with {frame}, the odometry shows this drive in a wrong direction"
+        verdict = "as set" if right else wrong
         say(
             f"The robot has turned by {turned_rad:.2f} rad and driven forward. So delta_frame is"
             f" {found.delta_frame}, {verdict}."

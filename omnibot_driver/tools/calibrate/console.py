@@ -129,8 +129,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    A known uncertainty below 10 has two significant digits, and the values have as many decimals.
-    From 10 on, all three are whole numbers.
+    A known uncertainty below 10 has two significant digits, and both values have the same number of
+    decimals as the uncertainty. If the uncertainty is 10 or more, all three are whole numbers.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

@@ -188,8 +188,8 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first is with the driver's current geometry, the second with ``found``, but with its mean
-    radius for all wheels.
+    The first error is for the driver's current geometry. The second error is for the geometry
+    ``found``, but with its mean wheel radius for all wheels.
     """
     before: list[float] = []
     after: list[float] = []

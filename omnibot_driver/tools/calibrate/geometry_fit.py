@@ -115,7 +115,8 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
     """Return the path that the same wheel angles give with other radii, from the origin, (n, 3).
 
     * ``path``: poses that were computed with the assumed radii.
-    * ``factors``: new / assumed radius of each wheel: for all steps, (3,), or for each, (n - 1, 3).
+    * ``factors``: new / assumed radius of each wheel. The shape is (3,) if the factors are the same
+      for all steps, otherwise (n - 1, 3).
     * ``base``: new / assumed base radius.
     """
     return _rolled(rims_of(path, base_radius_m), factors, base * base_radius_m)

@@ -20,7 +20,7 @@ STANDS_PART: Final = 0.1
 """Largest fraction of the commanded speed at which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""Largest ratio of the speed in the second half of a drive to that in the first half at which the
+"""Largest speed in the second half of a drive, divided by the speed in the first half, at which the
 robot is regarded as stopping."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """Limits for the speed of a drive with twice the command, divided by the speed of the first drive.

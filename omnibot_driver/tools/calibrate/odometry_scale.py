@@ -3,8 +3,8 @@
 """``calibrate geometry`` and ``calibrate scale`` for a base that only drives straight and turns.
 
 If the driver has the parameter ``metres_per_count``, the tool finds ``metres_per_count``,
-``linear_scale`` and ``motor_balance``; otherwise, the scales of the odometry. This module does not
-know the base's wheels.
+``linear_scale`` and ``motor_balance``. Otherwise, it finds the scales of the odometry. This module
+does not know the base's wheels.
 """
 
 import argparse
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives. A wrong measurement of one drive shows, because the results differ."""
+"""Number of straight drives. If the user measures one of them wrongly, their results differ."""
 UNLIKE: Final = 4.0
 """Number of standard deviations. If two ratios differ by more than this number, the tool warns."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
@@ -35,8 +35,8 @@ COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s. The tool
 multiplies ``COUNT`` by a factor, and divides ``UNITS`` by the same factor."""
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
-"""Name, name in /diagnostics, and standard deviation of the balance of the two motors, which the
-driver measures."""
+"""The balance of the two motors, which the driver measures: name of the parameter, name in
+/diagnostics, and standard deviation of the measured value."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark where"
     " the robot's centre is and where the front points. After a straight drive, enter how far the"

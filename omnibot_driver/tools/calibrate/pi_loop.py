@@ -81,8 +81,8 @@ def answer(
 ) -> Array:
     """Return the speed of a wheel, in RPM, after a step of the set-point from standstill.
 
-    The first dimension is time, in steps of 1 ms. The others are the common shape of the gains and
-    the last three arguments.
+    The first dimension is time, in steps of 1 ms. The other dimensions are the common shape of the
+    gains, ``dead_s``, ``begun`` and ``sent_s``.
 
     * ``dead_s``: replaces the dead time of ``loop``.
     * ``begun``: initial position of the wheel between two encoder ticks, 0 to 1.

@@ -43,12 +43,12 @@ times, because the board does not acknowledge settings."""
 
 QUIET_S: Final = 0.5
 """Period, in s, with which the board sends its tick counts during a record. It is long, because the
-board can miss encoder ticks while it sends. If the user has set no period, the tool keeps the
-board's own period, which it could not restore."""
+board can miss encoder ticks while it sends. If the user has not set ``ticks_period``, the tool does
+not change the board's own period, because it could not restore that period."""
 RATE_SHOWN: Final = "Odometry rate (Hz)"
 """Name in /diagnostics of the rate at which the board sends its ticks: "measured of expected".
 
-If the user has set no period, the driver has measured the expected rate too.
+If the user has not set ``ticks_period``, the driver measures the expected rate as well.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
@@ -115,7 +115,7 @@ def _require_full_duty(parameters: Mapping[str, Any]) -> None:
 class _Bench:
     """Sets parameters, and records the wheels of the robot, which is on a box.
 
-    ``show``: called after each record, with the number of records until then.
+    ``show``: called after each record, with the number of records made so far.
     """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:

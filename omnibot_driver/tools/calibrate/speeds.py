@@ -2,8 +2,8 @@
 
 """Plan commands, measure the speeds that result, and fit the scale.
 
-A *count* is the unit of the board's commands, which are whole counts here. This module does not
-know the robot.
+A *count* is the unit of the board's commands. Here, each command is a whole number of counts. This
+module does not know the robot.
 """
 
 from collections.abc import Sequence
@@ -159,7 +159,9 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the coordinate of each pose along one axis of the robot at the mean heading.
+    """Return the coordinate of each pose along one axis of the robot.
+
+    The direction of the axis is that at the mean heading of all poses.
 
     ``axis``: 0 for x, 1 for y, 2 for yaw.
     """

@@ -67,7 +67,7 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Return the corrections of the two levels of an encoder's signal, which differ in duration.
+    """Return the corrections for an encoder whose two levels differ in duration.
 
     ``ticks_s``: times between ticks at constant duty, with both corrections set to 1. Raises
     ToolError for irregular ticks.

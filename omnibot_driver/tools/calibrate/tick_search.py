@@ -45,8 +45,9 @@ LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered. The
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive times between ticks. Above this limit,
-the board has missed a mark in the earlier time, if the earlier error is above half the limit.
+"""Limit for the sum of the relative errors of two successive times between ticks. If the sum is
+above this limit, and the earlier error is above half of it, the board has missed a mark in the
+earlier time.
 
 * Missed mark: the sum is about 1, or smaller if the board's clock loses up to 6 ms.
 * Mark noticed late: the sum is near 0.
@@ -75,7 +76,8 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s, for the values of a search.
 
-    The values contain their sum and ratio, because exchanged constants describe the same plant.
+    The values contain the sum and the ratio of the constants, because exchanged constants describe
+    the same plant.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -153,7 +155,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        All later searches expect two distances between marks in a time with a missed mark.
+        In all later searches, a time with a missed mark spans two distances between marks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -289,7 +291,8 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the predicted times between ticks in s, record after record.
 
-        ``off``: displacements of the marks. None: from ``values`` or from an earlier fit.
+        ``off``: displacements of the marks. None: use those in ``values``, or those of an earlier
+        fit if ``values`` contains none.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

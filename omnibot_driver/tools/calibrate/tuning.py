@@ -83,8 +83,8 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    ``now``: the present gains; the errors are relative to those with these gains. Raises ToolError
-    if no gains are within the limits.
+    ``now``: the present gains. The errors of a candidate are divided by the errors with ``now``.
+    Raises ToolError if no gains are within the limits.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

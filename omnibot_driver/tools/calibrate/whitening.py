@@ -19,9 +19,9 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
     ``rows``: rows of successive residuals.
 
-    * ``lags`` is 1: the value for lag 1 is limited to the range from -0.5 (only displaced encoder
-      marks) to 0 (only independent errors).
-    * ``lags`` is larger: each value is multiplied by a factor that decreases with the lag.
+    * If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 (only displaced
+      encoder marks) to 0 (only independent errors).
+    * If ``lags`` is larger, each value is multiplied by a factor that decreases with the lag.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -43,7 +43,8 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 def whitener(of_lags: Column, length: int) -> Column:
     """Return the matrix that removes an autocorrelation from a row of ``length`` residuals.
 
-    For a shorter row, use its upper left part. ``of_lags``: the autocorrelation from lag 0 on.
+    For a shorter row, use the upper left part of the matrix. ``of_lags``: the autocorrelation from
+    lag 0 on.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]

@@ -206,7 +206,7 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """Return what the board is known to lack, of ``imu``, ``start`` and ``pause``."""
+        """Return those of ``imu``, ``start`` and ``pause`` that the board is known not to have."""
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}

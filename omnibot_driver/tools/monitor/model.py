@@ -63,7 +63,7 @@ class View:
 
     ``said``: the reply to the user's last action.
 
-    ``lacks``: what the board does not have, of ``imu``, ``start`` and ``pause``.
+    ``lacks``: those of ``imu``, ``start`` and ``pause`` that the board does not have.
     """
 
     driver: str

@@ -67,7 +67,7 @@ def _step(series: Series) -> ClockStep | None:
 def by_stamp(log: Log) -> Log:
     """Return the log with IMU and odometry in the order of their timestamps.
 
-    If the recorder's clock stepped back, messages from before and after the step are mixed.
+    In the order of arrival, messages from before and after a step of the clock may be mixed.
     """
     return replace(log, imu=_by_stamp(log.imu), odom=_by_stamp(log.odom))
 

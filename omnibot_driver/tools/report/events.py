@@ -16,7 +16,7 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Age of a state in s from which its report in /diagnostics proves that the driver still runs.
+"""Age of a state, in s. If /diagnostics still reports the state at this age, the driver still runs.
 
 Without such a report, a driver whose last state is "disconnected" has ended.
 """
@@ -140,7 +140,8 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
 def _told_elsewhere(status: Status) -> bool:
     """Return whether the report of the diagnostics omits this status.
 
-    Another finding reports it, or it is the board's status in the first 3 s (``FIRST_SECONDS``).
+    It omits a status that another finding reports, and the board's status in the first 3 s
+    (``FIRST_SECONDS``).
     """
     if status.name.endswith("Commands"):
         return "e-stop" in status.message

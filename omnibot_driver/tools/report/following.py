@@ -49,7 +49,7 @@ class Answer:
     ``error``: for each axis, rms of measured - gain · commanded motion.
 
     ``spread``: for each axis, ``error`` / rms of the command; infinite if no command was constant
-    for long enough, because the motors' reaction then changes the gain.
+    for long enough. The gain then also depends on how fast the motors react.
     """
 
     lag_s: float
@@ -59,12 +59,12 @@ class Answer:
 
     @property
     def off(self) -> Mask:
-        """For each axis, whether the gain is not 1."""
+        """For each axis, whether the gain differs from 1 by more than ``TOLERANCE``."""
         return np.abs(self.gains - 1.0) > TOLERANCE
 
     @property
     def wrong(self) -> Mask:
-        """For each axis, whether the gain is not 1 for another reason than slow motors."""
+        """For each axis, whether the gain differs from 1 by more than slow motors can explain."""
         clear = np.abs(self.gains - 1.0) > TOLERANCE + self.spread
         return np.asarray(clear | (self.gains < REVERSED))
 
@@ -73,8 +73,8 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
     The delay is the one with the best fit. The gain of an axis comes from the times at which its
-    command is constant (``STEADY_S``) and not near zero, or from all times if these last less than
-    ``SUSTAINED_S`` in all.
+    command is constant (``STEADY_S``) and not near zero. If these times last less than
+    ``SUSTAINED_S`` in all, the gain comes from all times.
 
     ``usable``: for each measurement, whether to use it.
     """
@@ -105,7 +105,7 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 
 
 def _constant(commands: Series, at_s: Array) -> Mask:
-    """Return, for each time and each axis, whether the command was constant just before."""
+    """Return, for each time and axis, whether the command had been constant for ``STEADY_S``."""
     now = commands.held(at_s)
     constant = np.ones(now.shape, dtype=bool)
     for ago_s in np.arange(0.05, STEADY_S, 0.05):
@@ -174,7 +174,7 @@ def _rim_speed(pair: Pair) -> Array:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return, for each time, whether commands had no effect then, or less than 0.5 s before.
+    """Return, for each time, whether commands were ignored at this time or up to 0.5 s before it.
 
     The driver ignores commands while the e-stop is latched or the board does not run.
     """

@@ -18,8 +18,9 @@ Mask = NDArray[np.bool_]
 COMMAND_TIMEOUT_S: Final = 0.5
 """Time in s after which a command has no effect: the driver's default of ``cmd_vel_timeout``."""
 OTHER_CLOCK_S: Final = 1.0
-"""Largest median difference, in s, between timestamp and arrival of a topic's messages that a delay
-can cause. If it is larger, the recorder's clock differs from the driver's clock."""
+"""Limit, in s, for the median difference between timestamp and arrival of a topic's messages. Up to
+this limit, the difference can be a delay. If it is larger, the recorder's clock differs from the
+driver's clock."""
 SETTLING_S: Final = 0.2
 """For this time in s before and after a change of state, a gap between messages is normal."""
 
