@@ -84,7 +84,7 @@ class Motor:
     def _through_gap(self, turns: float) -> float:
         """Return how far the wheel turns, in turns, when the motor makes ``turns`` turns.
 
-        The backlash between motor and wheel absorbs the rest.
+        The backlash between motor and wheel absorbs the difference.
         """
         gap = self._gap + turns
         self._gap = min(max(gap, 0.0), self._settings.backlash_turns)

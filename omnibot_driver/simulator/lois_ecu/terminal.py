@@ -50,7 +50,11 @@ class Terminal:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 
     def sensor(self, sensor: int, text: bytes) -> bytes:
-        """Process text from a sensor. Return the part that the board sends to the host at once."""
+        """Process text from a sensor. Return the text that the board sends to the host now.
+
+        With the quirk ``terminal_mixes_sensors``, this method returns nothing, and ``mixed``
+        returns the text later.
+        """
         if not self._quirks.terminal_mixes_sensors:
             return text if self.mode == sensor else b""
         if self.on:

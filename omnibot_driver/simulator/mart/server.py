@@ -20,7 +20,7 @@ QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
 """``BOOT_S``: time in s from a restart of the program until its ports are open.
 
-``START_UP_S``: time in s from then until the program has started up completely.
+``START_UP_S``: time in s from the opening of the ports until the program has started up completely.
 """
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 

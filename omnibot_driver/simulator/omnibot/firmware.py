@@ -134,12 +134,13 @@ class SimulatedBoard:
     def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:
         """Push the robot along its own axes, and turn it to the left, from now on.
 
-        The arguments are added to the efforts of the motors, in PWM steps.
+        The arguments are a force and a torque in PWM steps, which are added to the efforts of the
+        motors.
         """
         self._world.force = Force(x_pwm, y_pwm, turning_pwm)
 
     def grip(self, vx_mps: float = 0.0, vy_mps: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Force this twist on the robot against its motors. A zero twist holds it in place."""
+        """Force this twist on the robot against its motors. A zero twist holds the robot."""
         self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
 
     def let_go(self) -> None:

@@ -2,8 +2,8 @@
 
 """Positional control: driving to a commanded pose.
 
-The manual describes only the switch for it; everything else is assumed. This module must not know
-wheels.
+The manual describes only the switch that selects this control; everything else is assumed. This
+module must not know wheels.
 """
 
 from math import cos, hypot, sin

@@ -22,8 +22,8 @@ from omnibot_driver.tools.needs import ToolError
 WHEELS_ALIKE: Final = 0.01
 """Assumed relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
-"""Largest accepted relative difference between a fitted and an assumed radius. Beyond it, the
-user's measurements are regarded as wrong."""
+"""Largest accepted relative difference between a fitted and an assumed radius. If the difference is
+larger, the user's measurements are regarded as wrong."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,8 +29,8 @@ SQUARE_RAD: Final = math.radians(35)
 """Largest accepted deviation of the angle between the two tilts from 90°, in rad."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest rotation, in rad, by which a mounting is corrected to one whose axes are parallel to
-those of the body."""
+"""Largest rotation, in rad, by which a measured mounting is corrected to make its axes parallel to
+the body's axes."""
 HAND_RAD: Final = math.radians(2)
 """Smallest assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0

@@ -99,7 +99,7 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether a robot with these signs of its axes would be a mirror image of the real one.
 
-    The result is False if the user only takes another side for the front.
+    The result is False if the user has only mistaken another side of the robot for its front.
     """
     x, y, yaw = signs
     return x * y != yaw

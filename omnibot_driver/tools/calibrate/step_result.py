@@ -19,8 +19,8 @@ MANY: Final = 1.5
 """Ratio of the residuals to the quantisation error above which the tool warns. Delayed commands
 double the residuals; the delay that the tool finds for the wheel is then 4 ms too long."""
 UNEXPLAINED: Final = 1.2
-"""Ratio of the motor model's residual to the second-order model's, above which the motor model is
-regarded as wrong."""
+"""Residual of the motor model, divided by the residual of the second-order model, above which the
+motor model is regarded as wrong."""
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:

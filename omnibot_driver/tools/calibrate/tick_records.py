@@ -117,7 +117,10 @@ class Response:
 
 
 def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
-    """Return the step response in a record, without the first time (it includes the standstill)."""
+    """Return the step response in a record of times between ticks.
+
+    The first time is not used, because it includes the standstill.
+    """
     times_s = ticks_s[1:].copy()
     times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
     ends_s = np.concatenate(([0.0], np.cumsum(times_s)))

@@ -188,8 +188,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals, and remove it in all later searches.
 
-        ``values``: the values of the plant. The load, and uneven marks until they are fitted, cause
-        the correlation.
+        ``values``: the values of the plant. The correlation comes from the load, and from uneven
+        marks that are not fitted yet.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)

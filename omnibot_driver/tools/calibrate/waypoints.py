@@ -24,7 +24,7 @@ ANGULAR_BRAKING: Final = 0.4
 
 
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
-    """Return a control law that drives the robot to these poses in turn, and stops it at each pose.
+    """Return a control law that drives the robot from pose to pose, and stops it at each pose.
 
     ``places``: the poses relative to the start, with unwrapped yaw.
 

@@ -13,7 +13,7 @@ from omnibot_driver.tools.report.findings import Finding, Level, span
 from omnibot_driver.tools.report.log import Log, Series
 
 LEAST_STEP_S: Final = 0.3
-"""Lasting change of the smallest delay, in s, that is regarded as a step of a clock."""
+"""Smallest lasting change of the least delay, in s, that is regarded as a step of a clock."""
 FEWEST: Final = 10
 """Number of messages before and after a step that show that the change lasts."""
 

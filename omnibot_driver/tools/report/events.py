@@ -63,9 +63,10 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Return the joined spans in which the board was disconnected or connecting.
+    """Return the spans of time in which the board was disconnected or connecting.
 
-    Spans that end in the first 3 s of the log (``FIRST_SECONDS``) are left out.
+    Adjacent spans are joined. Spans that end in the first 3 s of the log (``FIRST_SECONDS``) are
+    left out.
     """
     lost: list[Span] = []
     for state in states:

@@ -65,10 +65,10 @@ def _all(log: Log) -> Iterator[Finding]:
 
 
 def _missing_imu(log: Log) -> Level:
-    """Return how severe it is that the log has no message of the IMU.
+    """Return the level of the finding that the log has no message of the IMU.
 
     * GOOD: the board has no IMU.
-    * BAD: the board has one, or the log of a single robot has no Stream status.
+    * BAD: the board has an IMU, or the log of a single robot has no Stream status.
     * NOTE: otherwise.
     """
     streams = [status for status in log.diagnostics if status.name.endswith(": Stream")]
