@@ -11,7 +11,7 @@ from typing import Final
 from omnibot_driver.parameters import RANGE_TYPES, Parameter
 
 MOST_GAINS: Final = 17
-"""Largest number of values in ``steering_gains``: the board answers ``cpsteer`` with as many."""
+"""Largest number of values in ``steering_gains``: the board's answer ``cpsteer`` has 17 values."""
 
 FRONT_PORT: Final = (
     Parameter(

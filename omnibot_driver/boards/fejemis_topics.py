@@ -208,7 +208,7 @@ class FejemisTopics:
         return serve
 
     def _forget_bias(self, name: str) -> str:
-        """Set the parameter ``name``, a bias, to zero after the board has removed its own bias.
+        """Set the parameter ``name``, a bias, to zero, because the board now subtracts the bias.
 
         Return a remark for the service's answer; empty if the parameter was zero.
         """
@@ -274,8 +274,8 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason for a refusal, or an empty string.
 
-        ``off``: whether to switch a device off. The boards' state never prevents it, but a closed
-        port gives a warning.
+        ``off``: whether ``action`` switches a device off. It is then called in any state of the
+        boards, but a closed port gives a warning.
         """
 
         def say(session: Session, now: float) -> str:

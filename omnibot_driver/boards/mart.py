@@ -59,8 +59,8 @@ PARAMETERS: Final = table(
             " higher number. sim:// is a simulated board inside the driver.",
         },
         "publish_raw": {
-            "description": "Publish the bytes of every datagram on ~/raw_rx and ~/raw_tx, each"
-            " with /command and /stop."
+            "description": "Publish the bytes of every datagram: received ones on ~/raw_rx/command"
+            " and ~/raw_rx/stop, sent ones on ~/raw_tx/command and ~/raw_tx/stop."
         },
     },
     checks=(refuse_recordings,),

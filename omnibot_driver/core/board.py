@@ -112,9 +112,9 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Position of the last received byte in the stream of IMU samples.
+        """How far the stream of IMU samples had arrived when the last read of the port ended.
 
-        None if the position is uncertain or has not changed.
+        None if this is uncertain, or has not changed since the read before.
         """
         return None
 
@@ -164,8 +164,8 @@ class Board(Protocol):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes, update ``mode``, and return the readings in order.
 
-        If later bytes must prove a reading, the call with those bytes returns it. ``now``: time of
-        arrival.
+        If a reading is certain only after later bytes, the call that receives these bytes returns
+        the reading. ``now``: time of arrival.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -284,10 +284,11 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the guard's packets for a hang of this process: without and with a latched e-stop.
+        """Return the packets that the guard sends if this process hangs, in two versions.
 
-        The first item contains Stop; the second contains the emergency stop, then Stop. The driver
-        calls this method after each input and before each output.
+        The first version, for a released e-stop, contains Stop. The second, for a latched e-stop,
+        contains the emergency stop, then Stop. The driver calls this method after each input and
+        before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

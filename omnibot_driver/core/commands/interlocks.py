@@ -48,7 +48,8 @@ class Interlocks:
     def refused(self, now: float) -> None:
         """Record that a motion command was refused; call this for every refused command.
 
-        The call restarts the waiting time after a first stop by the motion monitor.
+        After the motion monitor's first stop, motion is allowed again when no command has arrived
+        for ``cmd_vel_timeout``. The call restarts this time.
         """
         self._interlock.be_active(now, self._policy.settings.timeout_s)
 

@@ -112,7 +112,7 @@ def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
 
 
 def slow(values: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Return the values, scaled by one factor to a largest magnitude of at most ``limit``."""
+    """Return the values, scaled by one factor so that no magnitude exceeds ``limit``."""
     largest = max(map(abs, values))
     return tuple(values) if largest <= limit else _scale(values, limit / largest)
 

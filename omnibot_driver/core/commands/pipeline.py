@@ -102,8 +102,8 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        The robot is stopped if the encoding fails, or if a standstill has become an unchecked
-        motion.
+        The robot is stopped if the encoding fails. It is also stopped if the new settings turn a
+        standstill into a motion, because this motion has not been checked.
         """
         current = self.policy.current
         if current is None:

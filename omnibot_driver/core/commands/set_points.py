@@ -69,8 +69,8 @@ class BaseSetpoint:
 
     * The attribute ``is_zero``: whether the command is a standstill.
     * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
-    * ``before``: previous set-point. The ramp starts at the velocity that this set-point has
-      reached; at rest if the set-point is not a body velocity.
+    * ``before``: previous set-point. The ramp starts at the velocity that ``before`` has reached,
+      or at rest if ``before`` is not a body velocity.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 

@@ -36,7 +36,7 @@ PROOFS: Final = 2.0
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-After a loss, a displacement also spans the lost ones, so its duration is not the period.
+A displacement that follows lost ones also covers their time, so it lasts longer than the period.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop

@@ -39,8 +39,8 @@ DIGIT: Final = 6e-4
 The larger one applies, because the board prints few digits.
 """
 HALF: Final = 0.51
-"""Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last printed digit:
-half a unit for rounding, and a little for single precision. No limit if the last digit is unknown.
+"""Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last printed digit: 0.5
+for rounding, and 0.01 for single precision. Without a known last digit, there is no such limit.
 """
 
 
@@ -98,7 +98,7 @@ class Configuration:
 
     @property
     def pending(self) -> bool:
-        """Whether motion is forbidden: the board is new and may still lack the user's settings."""
+        """Whether motion is forbidden, because a new board may still lack the user's settings."""
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new

@@ -39,9 +39,10 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: with the setting auto: whether the last line that is not a heartbeat contradicts
-      ``sums``. The driver's lines to the board then carry no checksum.
-    * ``contradicted``: whether the last line contradicts the user's setting ``line_sums``.
+    * ``doubtful``: with ``line_sums`` auto: whether the last line, apart from heartbeats,
+      contradicts ``sums``. While it does, the driver's lines to the board carry no checksum.
+    * ``contradicted``: with ``line_sums`` on or off: whether the last line contradicts this
+      setting.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -81,8 +81,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        * If the angle limits the speed, because each new angle changes the limit.
-        * If the lines have no checksums, so that a damaged line is soon replaced.
+        This is necessary in two cases. The angle limits the speed, so each new angle changes the
+        limit. Or the lines have no checksums, so a damaged line must soon be replaced.
         """
         return self.held or not self._pair.with_sums
 

@@ -11,8 +11,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: limits for lines with and without a correct checksum. If so
-many of 24 lines of one kind lack the learnt form, the form is no longer checked.
+"""``VARIES``: limit for lines with a correct checksum; ``VARIES_WITHOUT_SUM``: for other lines. If
+this number of 24 lines of one kind differ from the learnt form, their form is no longer checked.
 """
 OF: Final = 24
 

@@ -33,8 +33,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-``confs`` is never requested with ``confsi``: if that line loses its last letter, the board sets its
-geometry to zero.
+The driver never requests ``confs`` with the line ``confsi``: if ``confsi`` lost its last letter,
+the board would set its geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
@@ -123,8 +123,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        A message that shows a restart deletes the board's earlier times, which the messages before
-        it need.
+        If a message shows a restart of the board, the board's earlier times are deleted. All
+        messages before this one need these times, so they must be handled first.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

@@ -16,21 +16,22 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Limit for the time between the arrivals of two samples that both seem late, in sampling periods.
+"""Limit for the time between the arrivals of two successive samples, in sampling periods.
 
-Above it, an earlier sample was lost. Below it, the host has stalled.
+If both samples seem late, and this time is above the limit, an earlier sample was lost. If it is
+below the limit, the host has stalled.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 BLOCK_S: Final = 0.5
-"""Shortest time in s in which the samples of a block arrive. Otherwise, the late samples after a
-stall could fill a block alone.
+"""Shortest time in s in which the samples of a block arrive. A shorter block could consist only of
+late samples, which arrive together after a stall.
 """
 EARLY_S: Final = 5e-4
-"""If a sample seems early by more than this time, in s, fewer samples were lost before it than
-assumed.
+"""Longest time in s by which a sample may seem to arrive before its sampling time. If a sample
+seems to arrive even earlier, the driver has assumed too many lost samples before it.
 """
 
 
@@ -73,12 +74,14 @@ class ImuSamples:
     def sampled_s(
         self, arrived_s: float, not_before_s: float, next_pose_s: float, skipped: int
     ) -> float:
-        """Return the time at which the board took the next sample. All times are in s of its clock.
+        """Return the time at which the board took the next sample.
+
+        All times are in s of the board's clock.
 
         * ``arrived_s``: arrival time of the sample.
         * ``not_before_s``, ``next_pose_s``: times of the poses before and after the sample;
           infinity if the next pose has not arrived.
-        * ``skipped``: number of incomplete samples before it.
+        * ``skipped``: number of incomplete samples between the previous sample and this one.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -114,9 +117,11 @@ class ImuSamples:
     def _follow(self, delay_s: float) -> None:
         """Update the phase of the sampling times after a new sample.
 
-        The new phase is the latest with which no recent sample arrives before its sampling time.
+        The new phase is as late as possible, except that the sampling time of a recent sample must
+        not be after its arrival.
 
-        ``delay_s``: time in s from the new sample's sampling, by the old phase, to its arrival.
+        ``delay_s``: time in s from the new sample's sampling time, with the old phase, to its
+        arrival.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

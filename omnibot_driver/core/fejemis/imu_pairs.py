@@ -23,13 +23,14 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""If the two lines of a pair are this time in s or more apart, the pair may be false, so it must
-wait for the next pose.
+"""Limit in s for the time between the two lines of a pair. If the time reaches this limit, the pair
+may be false, so it must wait for the next pose.
 """
 SILENT_S: Final = 0.1
 """Longest usual time, in s, without gyro and acceleration lines.
 
-After a longer time, new pairs wait for the next pose, and are rejected if the board sent nothing.
+After a longer time, new pairs wait for the next pose. They are rejected if the pose shows that
+lines are missing.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver in which new pairs must wait for the next pose: the
@@ -38,11 +39,11 @@ kernel's buffer may have overflowed and lost lines.
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """``KNOWN_S``: magnitude of ``_evidence_s``, in s, from which its sign shows which line of a sample
-comes first. ``SUREST_S``: largest magnitude.
+comes first. ``SUREST_S``: largest magnitude of ``_evidence_s``, in s.
 """
 MARKED_S: Final = PERIOD_S
-"""Time in s that is added to an interval between a gyro and an acceleration line if another line
-arrives in it. Such an interval is probably between two samples.
+"""Time in s that is added to the interval between a gyro and an acceleration line if another line
+arrives between these two. They then probably belong to different samples.
 """
 PATIENCE: Final = 60
 """Number of intervals after which the first line of a sample is decided, even if the magnitude of
@@ -131,10 +132,10 @@ class ImuPairs:
         self._line("acc", acceleration, now)
 
     def other(self, kind: str) -> None:
-        """Receive a line of another ``kind``, its keyword.
+        """Receive a line that is neither a gyro nor an acceleration line. ``kind``: its keyword.
 
-        The missing second line of a pair is then regarded as lost, unless lines of this ``kind``
-        usually come within a pair.
+        If the second line of a pair has not arrived yet, it is then regarded as lost, unless lines
+        of this ``kind`` usually come within a pair.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -149,8 +150,8 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all waiting pairs.
 
-        Pairs are rejected if both gyro and acceleration lines are missing since the previous pose,
-        or if the time since then is unknown.
+        Pairs are rejected if lines of both kinds, gyro and acceleration, are missing since the
+        previous pose, or if the time since the previous pose is unknown.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S

@@ -282,11 +282,10 @@ class Jobs:
 
 
 def _answers(role: Role, message: Message) -> bool:
-    """Return whether ``message`` answers the query after ``eer``, the command to load a
-    configuration.
+    """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    The boards do not answer ``eer`` itself. The answer "unhandled" counts too: some front boards do
-    not know ``fwoi``.
+    ``eer`` loads a configuration; the boards do not answer it. Some front boards do not know the
+    query ``fwoi``: their answer "unhandled" is accepted too.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -3,7 +3,8 @@
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
 Lines are repeated, because the board does not acknowledge them. Exception: the line of a lift
-command, even of 0 V, is sent once, because each line that moves the lift limits its run time.
+command, even of 0 V, is sent once. Each line that moves the lift contains a run time, so the lift
+stops even if the line with 0 V is lost.
 """
 
 import math
@@ -27,8 +28,8 @@ Of several commands in this time, only the newest is sent. A stop of the lift is
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage. A lower
-voltage is sent if the checksum could not detect damage to the line.
+"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage. The driver
+lowers the voltage until the checksum detects damage to the line.
 """
 LEAST_TIME_S: Final = 0.04
 
@@ -47,8 +48,8 @@ class Machine:
         self._lift_line = b""
         """The line for the lift that is still to be sent; empty if there is none."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """Times in s: when to send the line for the lift, the earliest time for another line, and
-        the end of the lift's motion.
+        """Times in s. ``_lift_at``: when to send the line for the lift. ``_lift_again_at``:
+        earliest time for another line. ``_lift_until``: end of the lift's motion.
         """
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0

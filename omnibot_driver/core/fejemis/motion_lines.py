@@ -28,10 +28,11 @@ ANGLE_COST: Final = 1e4
 factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""Ratio of the outer wheel's speed to the smallest linear speed in the drive board's line, apart
-from 0.
+"""The linear speed in the drive board's line is 0, or at least the outer wheel's speed divided by
+``SLOWEST``.
 
-A backward line cannot contain 0, because the sign gives the direction.
+A line for backward motion cannot contain the linear speed 0, because the sign of this speed gives
+the direction.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.

@@ -14,7 +14,9 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""The first digit's power of ten is at least ``SMALLEST``, and less than ``LARGEST``."""
+"""``SMALLEST``, ``LARGEST``: limits for the power of ten of a safe number's first digit. The power
+is at least ``SMALLEST``, and less than ``LARGEST``.
+"""
 
 
 @cache
@@ -42,7 +44,8 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
     """Return the safe number (``numerals``) that is nearest to a positive ``number``, with its
     text.
 
-    ``down``: whether the result must not exceed ``number``, unless all safe numbers do.
+    ``down``: whether the result must not exceed ``number``. If all safe numbers exceed ``number``,
+    the result is the smallest of them.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)

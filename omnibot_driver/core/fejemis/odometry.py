@@ -44,7 +44,7 @@ NEW_FRAME: Final = 4
 Each of these poses must agree with the rejected pose just before it.
 """
 MOVED_FRAME: Final = 2
-"""Number of agreements, as in ``NEW_FRAME``, if the wheel speeds explain the motion between the
+"""Number that replaces ``NEW_FRAME`` if the wheel speeds explain the motion between the rejected
 poses."""
 LONGEST_JUMP_S: Final = 0.2
 """Longest time in s since the last accepted pose in which rejected poses that contradict each other
@@ -93,8 +93,8 @@ class PoseOdometry:
         self._before: WheelSpeeds | None = None
         self._speeds_s = self._time_s = -math.inf
         self._speeds_new = False
-        """Board times, in s, of the first pose after the last wheel speeds, and of the last pose.
-        ``_speeds_new``: whether no pose has arrived since the last wheel speeds."""
+        """Whether no pose has arrived since the last wheel speeds. ``_speeds_s``: board time, in s,
+        of the first pose after the last wheel speeds. ``_time_s``: board time of the last pose."""
 
     @property
     def moving(self) -> bool:
@@ -199,9 +199,11 @@ class PoseOdometry:
         )
 
     def _jump_at(self, pose: BoardPose, since_s: float) -> Pose | None:
-        """Return the motion, by the wheels, to this rejected pose; None if it may not be a jump.
+        """Return the motion from the last accepted pose to this rejected one, by the wheel speeds.
 
-        ``since_s``: time in s since the last accepted pose.
+        None if the speeds are unknown, or if rounding may be the reason for the rejection: the
+        pose then does not show a new coordinate frame. ``since_s``: time in s since the last
+        accepted pose.
         """
         assert self._pose is not None
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)

@@ -22,7 +22,8 @@ angle, in rad, at which a turn on the spot may begin, and may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
 """Deviation of the front wheel from its target angle, in rad, that is permitted at full speed. At a
-larger deviation, a lower speed keeps the error of the body's velocity as small.
+larger deviation, the speed is lowered until the error of the body's velocity is as small as with
+this deviation at full speed.
 """
 
 

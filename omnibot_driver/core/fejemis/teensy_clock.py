@@ -27,14 +27,16 @@ late it is: it may have waited during the stall.
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""Tolerance in s within which implausible board times must agree to begin the clock anew.
+"""Tolerance in s. Board times agree if they advance like their arrival times within this tolerance.
 
-At least ``AGAIN`` of them in a row must advance like their arrival times, for ``AGAIN_AFTER_S``.
+The clock begins anew if at least ``AGAIN`` implausible board times in a row agree, over at least
+``AGAIN_AFTER_S``.
 """
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s between lines that seem early and are counted together.
+"""Longest time in s from the first to the last of the lines that seem early and are counted
+together.
 
-Three (``AGAIN``) such lines begin the clock anew, because it began with a late line.
+Three (``AGAIN``) such lines show that the clock began with a late line, so the clock begins anew.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""

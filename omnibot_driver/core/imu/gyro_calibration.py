@@ -18,8 +18,8 @@ BLOCK_S: Final = 1.0
 GAP_S: Final = 0.2
 """Longest allowed time between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
-"""Time in s within which a request is answered. ``~/calibrate_gyro`` can take at most five seconds;
-the rest is for the writing of a file.
+"""Time in s within which a request is answered. ``~/calibrate_gyro`` may take five seconds, so one
+second is left to write a file.
 """
 
 STILL_RADPS: Final = 0.01

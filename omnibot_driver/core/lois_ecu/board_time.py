@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored tick reports, usually of five seconds: 100 ppm of clock error then change the
-delay by 0.5 ms.
+"""Number of stored tick reports. They usually cover five seconds; a clock error of 100 ppm changes
+the delay by 0.5 ms in this time.
 """
 FEWEST: Final = 8
 LATEST_S: Final = 0.25

@@ -64,8 +64,8 @@ SWINGING_M: Final = 0.055
 """Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks:
 ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
-"""Standard deviation in m of the robot's x, and of its y, after a wheel has rolled 1 m at an
-oscillating speed, in addition to ``SWINGING_M``.
+"""Standard deviation, in m, that is added to the robot's x and to its y after a wheel without
+counted ticks has rolled 1 m at an oscillating speed. ``SWINGING_M`` is applied as well.
 """
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviations of a wheel's distance after lost reports, as fractions of the distance rolled
@@ -73,8 +73,9 @@ meanwhile: at a steady and at an oscillating speed. Only for a wheel without cou
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Standard deviation of the error that remains after a large correction of a wheel's distance, as a
-fraction of the excess over ``CORRECTED_TICKS``. Only for a wheel without counted ticks.
+"""Standard deviation of the error that remains after a wheel's distance was corrected by more than
+``CORRECTED_TICKS``, as a fraction of the part of the correction that exceeds ``CORRECTED_TICKS``.
+Only for a wheel without counted ticks.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -232,7 +233,7 @@ class Comparison:
         self._speeds[index].come_to_rest()
 
     def _equal(self, told: Told, shown: tuple[float, float]) -> bool:
-        """Return whether both wheels have the same speed, which the board then does not report.
+        """Return whether both wheels have the same speed. The board does not report equal speeds.
 
         ``shown``: for each wheel, the estimate of its last measured speed, in m/s.
         """

@@ -191,8 +191,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Old reports do not show it, nor do those of the public firmware after RPM 0/0 or a backward
-        command.
+        Two kinds of reports show nothing: old ones, and those of the public firmware after RPM 0/0
+        or a backward command.
         """
         points, translation = self._points, self._translation
         if points.stood:

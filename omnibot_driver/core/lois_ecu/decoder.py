@@ -18,8 +18,8 @@ LONGEST_LINE: Final = 256
 """Largest accepted length of a line in bytes. Lines of the board's sensors, such as the GPS, are
 shorter than this."""
 SURE_AFTER: Final = 8
-"""Number of lines without a checksum that must follow a line with a checksum before such lines are
-accepted again."""
+"""Number of lines without a checksum that are discarded after each line with a checksum. After
+these, lines without a checksum are accepted again."""
 
 
 @dataclass(slots=True)

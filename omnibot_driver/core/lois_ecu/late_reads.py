@@ -20,8 +20,8 @@ read late, and their times are corrected. ``BoardTime`` handles shorter delays.
 """
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor, a little above 1, for times from the board's clock. With an inexact clock rate, the times
-would otherwise fall more and more behind the arrivals.
+"""Factor, a little above 1, by which durations from the board's clock are multiplied. Without it,
+an inexact clock rate could make the corrected times fall more and more behind the arrivals.
 """
 
 

@@ -28,8 +28,8 @@ START_STDDEV_TICKS: Final = 0.9
 that the board's odometry (0x20) misses each time a wheel starts."""
 FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses of a
-wheel faster than ``FAST_TICKS_PER_S``.
+"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses while a
+wheel is faster than ``FAST_TICKS_PER_S``.
 
 While the board sends, it notices ticks late and misses some speeds.
 """

@@ -69,7 +69,7 @@ class Suspicion:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: no reports without ticks have come in it."""
+        """Begin a new connection: measure the time without tick reports anew."""
         self._heard_at_s, self._without_s = math.inf, 0.0
 
     @property

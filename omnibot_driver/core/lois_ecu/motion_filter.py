@@ -37,7 +37,9 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts: the last part of a longer time."""
+"""Longest time in s that one call of ``advance`` predicts. Of a longer time, it predicts only the
+last part.
+"""
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
@@ -274,7 +276,8 @@ class MotionFilter:
     def _kind(self, index: int) -> str:
         """Return the kind of the command that a wheel follows: "rpm", "duty" or "stop".
 
-        After a duty, a Stop is still "duty": it does not change the error of the speed.
+        A Stop after a duty command is also of the kind "duty", because it does not change the error
+        of the speed.
         """
         course = self.wheels[index].course
         driven = course.target_mps or (self._kinds and self._kinds[index] == "duty")

@@ -54,8 +54,8 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. An odometry report in the same read
-        can then still correct the motion, so the wheels keep their ``blind`` flags."""
+        """Whether no time has passed since the last estimate. While this is true, an odometry
+        report in the same read can correct the motion, so the wheels keep their ``blind`` flags."""
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
