@@ -21,7 +21,8 @@ SIMULATOR: Final = "omnibot_driver.simulator.mart"
 def refuse_recordings(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the port is a recording.
 
-    A recorded reply does not name its request, so a recording does not show the odometry.
+    The odometry depends on the requests, and a recorded reply does not show which request it
+    answers.
     """
     if is_recording(values["port"]):
         raise ParameterError(

@@ -52,7 +52,7 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     * ``proof``: object to which each sent stop and motion is reported.
-    * ``heard``: called with the packets and the time after each write, also of requests.
+    * ``heard``: called after each write, also of a request, with the packets and the time.
     """
 
     def __init__(

@@ -12,8 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of lines in the diagnostics that the firmware has reported as unknown. The latest
-ones are shown.
+"""Largest number of the driver's lines that the diagnostics show as unknown to the firmware. They
+are the latest such lines.
 """
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 

@@ -3,7 +3,7 @@
 """The interface that every arrangement of wheels offers to the driver.
 
 Axes are REP-103's. Wheel rates are in rad/s, in the order of ``joints``. The methods also convert
-small displacements.
+small displacements of the body into rotations of the wheels, and back.
 """
 
 from collections.abc import Sequence

@@ -32,8 +32,8 @@ class Coasting:
     def unsure_mps(self, now: float, step_s: float) -> float:
         """Return the standard deviation of the speed at ``now``, with the sign of the speed.
 
-        It is half the difference between the speeds of a wheel that decelerates fast at once, and
-        of one that decelerates slowly after ``step_s``.
+        It is half the difference between the speeds of two assumed wheels. One decelerates fast
+        and at once, the other decelerates slowly and only after ``step_s``.
         """
         age_s = now - self.heard_s
         slow_mps = self._speed_after((1 + COAST_PART) * age_s)

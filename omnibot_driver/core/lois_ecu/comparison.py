@@ -36,8 +36,8 @@ of the tick report."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""``TICK_VARIANCE``, ``TURN_VARIANCE``, ``ALONG_VARIANCE``: variances, in squared ticks, of the
-errors of a tick count, and of the heading and the distance in the board's odometry (0x20).
+"""``TICK_VARIANCE``: variance of the error of a tick count, in squared ticks. ``TURN_VARIANCE``,
+``ALONG_VARIANCE``: the same for the heading and the distance in the board's odometry (0x20).
 """
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
@@ -55,7 +55,8 @@ this number of ticks. Otherwise, the next tick may not be due yet.
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a reported heading that differs
-from the expected one by more than both is ignored. It comes from an outdated wheel speed.
+from the expected one by more than both limits is ignored, because it comes from an outdated wheel
+speed. A reported distance that differs by more than ``LEAP`` is ignored too.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -68,8 +69,9 @@ SWERVED_M: Final = 0.05
 counted ticks has rolled 1 m at an oscillating speed. ``SWINGING_M`` is applied as well.
 """
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviations of a wheel's distance after lost reports, as fractions of the distance rolled
-meanwhile: at a steady and at an oscillating speed. Only for a wheel without counted ticks.
+"""Standard deviation of a wheel's distance after lost reports, as a fraction of the distance that
+the wheel rolled in their time. First value: at a steady speed. Second value: at an oscillating
+speed. Only for a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
@@ -226,7 +228,7 @@ class Comparison:
             self._take_equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Record that a wheel has come to rest, and remove the distance added since that time.
+        """Record that a wheel has come to rest, and remove the distance that was added after that.
 
         ``index``: 0 left, 1 right.
         """

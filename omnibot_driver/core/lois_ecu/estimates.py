@@ -59,7 +59,8 @@ class Estimates:
     def conclude(self, at_s: float, may_roll_mps: tuple[float, float]) -> FusedOdometry:
         """Return the estimate at ``at_s``, the time of the filter's state, and store its pose.
 
-        The next displacement begins at the stored pose. ``may_roll_mps``: see ``now``.
+        The next displacement begins at the stored pose. ``may_roll_mps``: greatest possible speed
+        of each wheel, in m/s.
         """
         motion = self._motion
         blind = [wheel.blind and not motion.signed for wheel in motion.wheels]

@@ -56,8 +56,8 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all received bytes; for each decoded report, call ``understood`` and
-    ``heard``.
+    Call ``look`` with all received bytes. After each read that contains reports, call
+    ``understood``, and ``heard`` with these reports.
 
     * ``advice``: what the user should check, or None.
     * ``no_ticks``: whether the board sends reports, but no ticks.

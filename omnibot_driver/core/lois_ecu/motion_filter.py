@@ -2,7 +2,8 @@
 
 """Kalman filter of both wheels' motion, and of the values that the board reports.
 
-Wheels have the radius in the settings. Left and right are those of the board.
+Both wheels have the radius in the settings. The left and the right wheel are the board's, not the
+robot's.
 """
 
 import math
@@ -93,8 +94,8 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest expected difference between the two measured wheel speeds, in m/s, since the
-        board's distance was last compared with the estimated one.
+        """Expected difference between the two measured wheel speeds, in m/s: its smallest value
+        since the board's distance was last compared with the estimated distance.
 
         While both speeds are equal, the public firmware does not update its position.
         """
