@@ -12,7 +12,7 @@ IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
 """``VARIES``: limit for lines with a correct checksum; ``VARIES_WITHOUT_SUM``: for other lines. If
-this number of 24 lines of one kind differ from the learnt form, their form is no longer checked.
+at least this many of 24 lines of one kind differ from the learnt form, it is no longer checked.
 """
 OF: Final = 24
 

@@ -29,8 +29,8 @@ UNHEARD_GROUPS: Final = 3
 """How long the driver predicts the pose after the last tick or odometry report:
 ``UNHEARD_GROUPS`` periods of the tick reports, but at least ``UNHEARD_S`` seconds."""
 LOST_REPORTS_S: Final = 1.2
-"""Limit in s for a silence of the board. If it was shorter, and no set-point changed meanwhile, the
-driver assumes that only reports were lost, and that the wheels followed their set-points."""
+"""Limit in s for a silence of the board. If a silence was shorter, and no set-point changed in it,
+the driver assumes that only reports were lost, and that the wheels followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
