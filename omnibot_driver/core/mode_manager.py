@@ -51,7 +51,7 @@ RESET_WITHIN_S: Final = 9.5
 
 
 class Phase(Enum):
-    """How far a change of the board's mode has come. Motion is accepted only in SETTLED."""
+    """How far a change of the board's mode has progressed. Motion is accepted only in SETTLED."""
 
     CLOSED = "not connected"
     SETTLED = "settled"

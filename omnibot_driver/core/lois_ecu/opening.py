@@ -37,8 +37,8 @@ LINE_S: Final = 0.02
 # the end of another line could form a motion command. Even the beginning of a Stop is dangerous:
 # with the end of a setting, it could command full duty.
 AFTER_SET_POINT_S: Final = 0.015
-"""Shortest time in s from a set-point to a setting, and from a motion command to a *side command*:
-neither a set-point nor a setting, but for example a command for the LED."""
+"""Shortest time in s from a set-point to a setting, and from a motion command to a *side command*.
+A side command, for example for the LED, is neither a set-point nor a setting."""
 LONGEST_WAIT_S: Final = 0.5
 """Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
 may be due each time that a setting could be sent."""
@@ -113,9 +113,9 @@ class SettingsWriter:
     def _waits(self) -> bool:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
-        While the robot drives, no round begins after the first ``ROUNDS``: each written gain resets
-        the controller of a wheel. But a round that has begun is completed: if it has written the
-        terminal mode, a later line must restore the left short correction.
+        While the robot drives, only the first ``ROUNDS`` rounds may begin, because each written
+        gain resets the controller of a wheel. But the driver always completes a round: if the round
+        has written the terminal mode, a later line must restore the left short correction.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
@@ -151,8 +151,8 @@ class SettingsWriter:
     def repeat(self, now: float) -> None:
         """Write all settings again, as soon as no motion is commanded.
 
-        For a wheel that does not start: the board may have lost all lines with the low-pass
-        coefficient.
+        The caller has detected a wheel that does not start. Perhaps the board has lost all lines
+        that set the low-pass coefficient.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
@@ -227,10 +227,11 @@ class SettingsWriter:
         return b"".join(map(self._encoded, found))
 
     def _encoded(self, command: Command) -> bytes:
-        """Return the line of ``command``. Return both forms of a mode that is not confirmed.
+        """Return the line of ``command``. The user's setting decides whether it has a checksum.
 
-        A board that has just booted obeys only a line with a checksum. A Stop gets the other form
-        (see ``_begin_round``).
+        While the settings are unconfirmed, a mode gets two lines, the first one with a checksum: a
+        board that has just booted obeys no other line. A Stop gets only the form that the user's
+        setting does not select (see ``_begin_round``).
         """
         if command == outbound.STOP:
             return encode_command(command, with_sum=not self.settings.with_sum)
@@ -244,9 +245,10 @@ class SettingsWriter:
 
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
-        Another program may have set the board to the other form of lines (``checksum``) while the
-        robot rolls. The board then ignores the driver's usual Stops. So while the settings are
-        unconfirmed, each of the first ``ROUNDS`` rounds begins with a Stop in this form.
+        Lines have a checksum or none (``checksum``). Another program may have set the board to the
+        form that the driver does not use, while the robot rolls. The board then ignores the
+        driver's usual Stops. So while the settings are unconfirmed, each of the first ``ROUNDS``
+        rounds begins with a Stop in the form that the driver does not use.
         """
         if self._queue or not self._rounds_left:
             return

@@ -46,8 +46,8 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a speed controller while its wheel does not tick, as a fraction of
-``WINDUP_M``. At ``WINDUP_M``, the controller starts the wheel."""
+"""Limit for the integral of a speed controller (``wound_m``) while its wheel does not tick, as a
+fraction of ``WINDUP_M``. At ``WINDUP_M``, the controller would start the wheel."""
 
 
 class ReportedSpeed:
@@ -64,16 +64,16 @@ class ReportedSpeed:
         self._rejected_mps: float | None = None
         """The last reported speed, if it was rejected as implausible."""
         self._false = False
-        """Whether the board holds a speed that the wheel never had."""
+        """Whether the board keeps reporting a speed that the wheel never had."""
         self.misleads = False
-        """Whether the board's last heading contains such a speed."""
+        """Whether a speed that the wheel never had has changed the board's last heading."""
         self._doubted_m = 0.0
         """Standard deviation in m that was added to the wheel's distance, because the wheel may be
         at rest. A change of the reported speed sets it to 0."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Pass the wheel's estimated speed to ``resting``, because the board has reported no speed.
+        """Pass the wheel's estimated speed to the estimator ``resting``: the board reported none.
 
         ``duration_s``: for how long the board has reported no speed, in s.
         """
@@ -84,7 +84,7 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance that was added wrongly.
 
-        The distance since its last certain motion (``rolled_to_m``) is wrong.
+        This is the distance that was added since the wheel's last certain motion (``rolled_to_m``).
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:

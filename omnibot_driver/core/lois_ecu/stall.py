@@ -30,8 +30,8 @@ TOO_FAST_RPM: Final = 3
 """A repeated speed is outdated, and the wheel is at rest, if the speed is more than ``TOO_FAST``
 times the set-point, and more than ``TOO_FAST_RPM`` RPM above it."""
 UNLIKE: Final = 1.15
-"""Largest usual quotient of the two wheels' ratios of speed to set-point, while both wheels roll
-backward."""
+"""Limit for the difference between two wheels that roll backward. Usually, a wheel's ratio of speed
+to set-point is at most ``UNLIKE`` times the ratio of the other wheel."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8

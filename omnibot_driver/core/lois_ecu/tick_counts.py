@@ -37,15 +37,16 @@ After a shorter time, the wheels may also have rolled back.
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest assumed time in s since the last tick report, after the unit of the board's clock has
-become unknown.
+"""Longest time in s since the last tick report that the driver assumes when the unit of the board's
+clock becomes unknown.
 
-The time limits how far the wheels may have rolled back.
+The assumed time limits how far the wheels may have rolled back.
 """
 IN_FLIGHT_S: Final = 0.5
-"""Time in s, from the first counts after a reset, in which counts may be from before the reset.
+"""Time in s for which received counts may still be from before a reset.
 
-Such counts were sent before the board received the reset, or were read late.
+It begins when the first counts arrive after the driver has sent the reset. The board may have sent
+these counts before it received the reset, or the driver may have read them late.
 """
 
 
@@ -159,7 +160,7 @@ class TickCounts:
         * The clock counts ns, the board counts the ticks of both wheels, and the expected motion
           explains the counts.
 
-        ``fallen``: the larger decrease of a count.
+        ``fallen``: the larger one of the two counts' decreases, in ticks.
         """
         turns = FASTEST_TURNS_PER_S * duration_s + TURNS_MARGIN
         most = turns * self.ticks_per_revolution + TICKS_MARGIN
@@ -171,7 +172,7 @@ class TickCounts:
         return self._odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start, assumed to be after the previous report.
+        """Return the time in s since the board's start, if it restarted after the previous report.
 
         None in two cases:
 

@@ -42,7 +42,8 @@ class WheelModel:
     ``kind``, ``target_mps``: the command that the motor follows now.
 
     ``hidden_mps``: the firmware's RPM target, as a speed of the rim; kept in duty mode. The
-    firmware counts ticks only while it is positive. A negative duty lowers it with each tick.
+    firmware counts ticks only while this target is positive. With a negative duty, each tick lowers
+    the target.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:

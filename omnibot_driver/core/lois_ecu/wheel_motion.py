@@ -46,11 +46,11 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Factor in s for the error of a wheel's distance after an early halt, before the wheel has reached
-the assumed speed.
+"""Factors in s for the error of a wheel's distance. A wheel that halts soon after a new set-point
+has not yet reached the assumed speed, so it has rolled less far than assumed.
 
-The standard deviation in m is this factor times ``unsettled_mps``. First value: for the board's own
-gains. Second value: for the user's gains.
+The standard deviation of the error in m is the factor times ``unsettled_mps``. First factor: for
+the board's own gains. Second factor: for the user's gains.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -104,7 +104,7 @@ class Wheel:
         """Forget all commands and history, because the board has just started."""
         self.course = WheelModel(self.course.step_s)
         self.coasting = Coasting(-math.inf, 0.0)
-        """The wheel after the last command that takes its power away."""
+        """How the wheel coasts after the last command that stopped or reversed it."""
         self.restless_mps = 0.0
         """Largest recent difference between target and speed, in m/s. It decays with time."""
         self.unsettled_mps = 0.0

@@ -27,9 +27,10 @@ Only a working IMU reports the turn.
 """
 
 SUPERVISED_S: Final = 1.0
-"""Time in s without an answered change of the units, after which the driver sends ``CS 0 0`` in B.
+"""Time in s for a backward drive (B). If the server has answered no change of the motors' units for
+this time, the driver sends ``CS 0 0``, which changes nothing.
 
-The answer shows that the server still supervises the motion: after a restart of the server, the
+The answer shows that the server still supervises the motion. If the server was restarted, the
 motors run on without supervision.
 """
 STARTED_M: Final = 0.01

@@ -44,16 +44,17 @@ The value is a fraction of the track width; in turns below 1 rad, multiplied by 
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Ratio of random to constant error (standard deviations) of a turn computed from the commands.
+"""Random error of a turn that is computed from the commands, as a fraction of its constant error.
 
-The constant error has the same sign in all intervals between two encoder counts; the random error
-is independent in each interval.
+Both errors are standard deviations. The constant error has the same sign in all intervals between
+two encoder counts; the random error is independent in each interval.
 """
 ASTRAY: Final = 0.7
-"""Factor for a position error that an uncertain heading causes.
+"""Factor for the position errors that an uncertain heading causes.
 
-As a fraction of the driven distance, the error is this factor times the variance of the heading
-(rad²), but at most 1. One such error is assumed along the motion, and another one across it.
+There are two such errors: one along the motion, and one across it. The standard deviation of each
+error is a fraction of the driven distance. This fraction is the factor times the variance of the
+heading (rad²), but at most 1.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.

@@ -13,9 +13,9 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""Smallest measured distance or turn of a complete move, as a fraction.
+"""Smallest distance or turn that is measured in a complete move, as a fraction.
 
-The measured value is divided by the requested or the expected one, whichever is smaller.
+It is a fraction of the requested or the expected distance or turn, whichever is smaller.
 """
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
@@ -24,7 +24,7 @@ The word SLOW in a request doubles the times per degree and inch; ``Done.slownes
 the robot.
 """
 LEAST_PACE: Final = 0.65
-"""Slowest motion of one run of a move, as a fraction of the usual speed of this move."""
+"""Lowest mean speed in one run of a move, as a fraction of the usual speed in this move."""
 FULL, TWO = 0.6, 1.25
 """``FULL``: shortest duration of one complete run of a move. ``TWO``: shortest duration of two
 complete runs. Both are fractions of the move's usual duration."""
@@ -144,9 +144,10 @@ class Done:
 
     @property
     def lags(self) -> bool:
-        """Whether a move that was cut short shows much less motion than its duration allows.
+        """Whether a move that was cut short went much less far than is usual in its duration.
 
-        The encoder may show only the second run of a duplicated request.
+        If a duplicated request made the server run the move twice, the encoder may show only the
+        second run.
         """
         driven_s = self.lasted_s - 2 * SETTLES_S
         least = LEAST_PACE * self.asked * driven_s / (self.usual_s - SETTLES_S)
@@ -156,7 +157,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply belongs to another request. A stop that the driver has sent after it has then
-        ended the first run.
+        Such a reply belongs to another request. If the driver has sent a stop after the reply, the
+        stop has ended the first run of the move.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -42,9 +42,9 @@ ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """Largest difference between two readings that are regarded as equal, in V (VOLTS) or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of equal readings in a row that the driver requires if it is uncertain of the query.
+"""Number of equal readings in a row that the driver requires before it uses an uncertain reading.
 
-It is uncertain if the reply may answer another query.
+A reading is uncertain if its reply may answer another query.
 """
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3

@@ -19,7 +19,8 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units after which a missing reply does not stop the robot.
+"""Limit for a change of the motors' units, as a relative change. If the reply to a larger change is
+missing, the driver stops the robot.
 
 The limit applies to a backward drive (B) in which the server reports no headings: the robot's turn
 is then computed from the units.

@@ -78,7 +78,7 @@ FILES_BEGIN: Final = {
     Job.LAST_MOVE: "the file begins with a move: drive forward or backward, then call again",
     Job.LAST_TURN: "the file begins with a turn: turn the robot on the spot, then call again",
 }
-"""What to do if the controller has no file of this kind."""
+"""What the user must do to get a file of the last move or turn, if the controller has none."""
 UNPROVED: Final = (
     "the order of its pieces is not proved: compare it with the file on the controller, before"
     " ~/start_log deletes that file"
@@ -171,7 +171,7 @@ class Jobs:
         """Return the job's request if it must be sent now, else None.
 
         ``stands``: whether measurements show that the robot is at rest. Every job except
-        TURN_RECORD waits until it is.
+        TURN_RECORD waits until the robot is at rest.
         """
         ready = stands or self.job is Job.TURN_RECORD
         return self._request if ready and not self._waiting else None

@@ -25,8 +25,8 @@ STILL: Final[Mapping[Word, float]] = {
 }
 DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
 TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5}
-"""Without VOLTS, because a turn on the spot does not need the voltage. VOLTS crashes a server that
-starts up, and in a turn, no reply shows a quick restart."""
+"""Periods of the queries in a turn on the spot. VOLTS is left out, because a turn does not need the
+voltage. VOLTS crashes a server that starts up, and in a turn, no reply shows a quick restart."""
 PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.STILL: STILL,
     State.DRIVING: DRIVING,
@@ -57,8 +57,8 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The most urgent query has the smallest sum of due time and period, so that each query has
-        its turn.
+        The most urgent query has the smallest sum of due time and period. So frequent queries do
+        not delay the others for ever.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]

@@ -237,8 +237,8 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        Both are zero unless the start command may have been lost. The last encoder count shows this
-        motion if it is newer than the start.
+        Both are zero unless the start command may have been lost. If the last encoder count is
+        from after the start of the motion, the pose lacks the motion.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

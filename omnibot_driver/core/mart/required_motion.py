@@ -18,7 +18,8 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Part of the final yaw rate that the command may still lack when a turn on the spot begins.
+"""Limit for the start of a turn on the spot, as a fraction of the final yaw rate. The turn does not
+begin while a ramp keeps the commanded yaw rate farther than this from its final value.
 
 The server cannot change the rate of a turn.
 """

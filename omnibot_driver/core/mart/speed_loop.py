@@ -42,9 +42,11 @@ The measured speeds show which of these changes have arrived at the server.
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """How the driver learns about the motors if exchanges with the server are slow.
 
-``LEARN_TRIPS``: number of exchanges whose duration prolongs the averaging window (LEARN_S).
+``LEARN_TRIPS``: the averaging window is longer than LEARN_S by this number times the average
+duration of an exchange.
 
-``LESS_PER_S``: relative growth of a measured speed's standard deviation, per s of an exchange.
+``LESS_PER_S``: the standard deviation of a measured speed is larger by a fraction, which is this
+number times the average duration of an exchange in s.
 """
 SLOWEST_MPS: Final = 0.015
 """Measured wheel speed in m/s above which a wheel is regarded as turning."""
@@ -65,13 +67,15 @@ HOLD_AFTER_S: Final = 1.0
 integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units,
-as a multiple of the squared relative change.
+"""Two factors that increase the uncertainty of the wheel speed ratio after an uncertain change of
+the motors' units, and a limit. A factor, times the squared relative change of the units, is added
+to the relative variance of the ratio.
 
-``COPIED``: for a change that may arrive twice, because queries take longer than ``SLOW_TRIP_S``
-(s).
+``COPIED``: factor for a change that may arrive twice, because the network is slow.
 
-``MISSED``: for a change that the server did not answer.
+``MISSED``: factor for a change that the server did not answer.
+
+``SLOW_TRIP_S``: average duration of an exchange, in s, above which the network is slow.
 """
 
 
@@ -149,8 +153,8 @@ class SpeedLoop(Motors):
 
         ``units``: the units that both motors have; None for the current units of each motor.
 
-        MOST_DEAD units or more turn every motor, so nothing is learned from such a motor: it is
-        blocked. If ``units`` is None, the line of a motor that should certainly turn
+        A motor with MOST_DEAD units or more that does not turn is blocked, so nothing is learned
+        from it. If ``units`` is None, the line of a motor that should certainly turn
         (``MotorLine.turns``) does not change either.
         """
         for side in (self._right, self._left):

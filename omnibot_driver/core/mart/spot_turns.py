@@ -258,7 +258,8 @@ class SpotTurns:
         """Undo what was learned from a slow turn if the next turn is fast.
 
         Something has then held the robot in the slow turn. Call this before the driver learns from
-        a turn: at a slow turn, the method stores what the driver knows.
+        a turn. If that turn is slow, this method first stores what the driver knows, to be able to
+        undo what the driver learns from the turn.
 
         ``part``: the turn's measured rate divided by its commanded rate.
         """

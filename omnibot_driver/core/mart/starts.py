@@ -37,9 +37,11 @@ from omnibot_driver.core.mart.words import Form, Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 NAME_WAIT_S: Final = 2.0
-"""Longest time in s for which a controlled move waits until no earlier HELLO can arrive after it.
+"""Longest time in s for which the driver delays a controlled move, because an earlier HELLO may
+still arrive at the server after the move.
 
-After this wait, an answer to HELLO does not exclude a duplicate of the move.
+If the delay reaches this time, the driver sends the move nevertheless. An answer to HELLO then does
+not exclude a duplicate of the move.
 """
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""

@@ -51,7 +51,7 @@ class Word:
     ``takes_s``, ``least_s``: longest and shortest time from the request to the reply, in s.
 
     ``fails``: the texts that may follow ``fail`` in the reply to this command. The driver also
-    accepts a text that is listed for no command at all.
+    accepts a text that is not listed for any command.
     """
 
     text: str

@@ -14,9 +14,9 @@ from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 
 BEGUN_M: Final = 0.005
 BEGUN_RAD: Final = 0.01
-"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations, in m and rad, of a pose that shows by its value
-alone that the board began at zero. Only rounding makes a difference. A robot that drives to the
-origin in a gap rarely stops so near to it.
+"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations, in m and rad, from the pose that is expected if
+the board began at zero. A pose within them shows by its value alone that the board did: only
+rounding makes it deviate. A robot that drives to the origin in a gap rarely stops so near to it.
 """
 
 
@@ -52,12 +52,11 @@ class BoardFrame:
         self.pose = self.gate.proved = None
 
     def continues(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether a pose is so near to the expected place that a restart changes nothing.
+        """Return whether a pose continues the board's frame, although its counter began anew.
 
-        The counter of a pose seems to begin anew also if the pose before it was damaged.
-
-        A restart takes longer than a period. So the board did not restart if no displacement was
-        lost since the last accepted pose. If displacements were lost, the result is False.
+        The board may have restarted, or the previous pose was damaged. A restart takes longer than
+        a period, so the board did not restart if no displacement was lost since the last accepted
+        pose. The result is True if none was lost, and the pose is near the expected place.
 
         ``gap``: covariance of the motion that was lost since the last accepted pose.
         """
@@ -72,7 +71,7 @@ class BoardFrame:
 
         ``told``: the pose that the board reports.
 
-        ``before``: the same pose, but before the displacements that wait for a pose.
+        ``before``: the pose before the displacements that wait for a pose, computed from ``told``.
 
         ``confirmed``: whether ``told`` agrees with the last doubted pose.
 

@@ -177,11 +177,11 @@ class Uncertainty:
     def halt(self, way_m: float, turn_rad: float) -> None:
         """Add the uncertainty of a robot that came to rest unseen, because its board restarted.
 
-        It ends with the uncertainty of the gaps: a pose that continues the old frame shows that the
-        board has not restarted, and shows the motion. Unlike ``gap``, it does not increase the
-        tolerance for poses.
+        ``settle`` removes this uncertainty together with that of the gaps: a pose that continues
+        the old frame shows that the board has not restarted, and how the robot has moved. Unlike
+        ``gap``, this uncertainty does not increase the tolerance for poses.
 
-        ``way_m``, ``turn_rad``: mean distance and angle in which it came to rest.
+        ``way_m``, ``turn_rad``: mean distance and angle in which the robot came to rest.
         """
         self._halt += Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
 

@@ -39,7 +39,7 @@ class DeadReckoning:
         self.last_stamp_s: float | None = None
 
     def integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
-        """Move the robot by a displacement, and by the assumed motion of those lost before it."""
+        """Move the robot by a displacement, and by an assumed motion for those lost before it."""
         frame, track = self.frame, self.track
         last_stamp_s, self.last_stamp_s = self.last_stamp_s, stamp_s
         heading_rad = None if frame.pose is None else frame.pose.yaw_rad
