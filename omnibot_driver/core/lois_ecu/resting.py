@@ -3,7 +3,7 @@
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
 The public firmware repeats the last speed of a stopped wheel: usually 5 to 17 RPM, after a higher
-one.
+speed.
 
 This module works on reported speeds and the time between them.
 """

@@ -111,8 +111,8 @@ class ModeChange:
         """Return the command to send now to stop the robot before a change, or None.
 
         * First: Stop, until the robot is at rest, but at most for ``UNPROVED_S``.
-        * Then: RPM 0/0, until ``cleared``. It clears the RPM target: while the target is positive,
-          the public firmware counts backward motion by duty as forward motion.
+        * Then: RPM 0/0, until ``cleared``. RPM 0/0 clears the RPM target: while the target is
+          positive, the public firmware counts backward motion by duty as forward motion.
 
         ``stands``: whether the robot is seen at rest.
 

@@ -45,8 +45,8 @@ The assumed time limits how far the wheels may have rolled back.
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.
 
-It begins when the first counts arrive after the driver has sent the reset. The board may have sent
-these counts before it received the reset, or the driver may have read them late.
+The time begins with the first counts that arrive after the driver has sent the reset. In this time,
+counts can arrive that the board sent before it received the reset, or that are read late.
 """
 
 

@@ -131,8 +131,8 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that follow from a datagram of this channel.
 
-        Once the mode is nominal, each reply gives at least one reading. If there is no other, it is
-        ANSWERED.
+        Once the mode is nominal, each reply gives at least one reading: ANSWERED if there is no
+        other reading.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)

@@ -65,7 +65,7 @@ class Motors:
         """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
         ``units``, ``seen_radps``: units of both motors, and measured rate, in the turn in progress.
-        The result takes them into account, but the lines of the motors do not learn from them.
+        The result takes them into account, but the driver does not learn from them.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))

@@ -238,7 +238,7 @@ class Reckoning(CorrectedPose):
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
         Both are zero unless the start command may have been lost. If the last encoder count is
-        from after the start of the motion, the pose lacks the motion.
+        from after the start of the motion, the pose lacks this motion.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

@@ -33,7 +33,7 @@ A server whose clock is set back reports 1e15 degrees, for example.
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is predicted after its last report."""
 ODD_TIMES: Final = 3
-"""Number of implausible headings in a row. When it is reached, the last of them is accepted."""
+"""After this number of implausible headings in a row, the driver accepts the last of them."""
 SPREADS: Final = 4
 """The turn rate is averaged over ``SPREADS`` times the time uncertainty of a reply."""
 

@@ -40,13 +40,13 @@ MOST_MISSED: Final = 4
 The measured speeds show which of these changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""How the driver learns about the motors if exchanges with the server are slow.
+"""How the driver learns about the motors if exchanges with the server are slow. An exchange takes
+``trip_s`` on average (s).
 
-``LEARN_TRIPS``: the averaging window is longer than LEARN_S by this number times the average
-duration of an exchange.
+``LEARN_TRIPS``: the averaging window lasts at least ``LEARN_S + LEARN_TRIPS * trip_s``.
 
-``LESS_PER_S``: the standard deviation of a measured speed is larger by a fraction, which is this
-number times the average duration of an exchange in s.
+``LESS_PER_S``: the standard deviation of a measured speed is multiplied by
+``1 + LESS_PER_S * trip_s``.
 """
 SLOWEST_MPS: Final = 0.015
 """Measured wheel speed in m/s above which a wheel is regarded as turning."""

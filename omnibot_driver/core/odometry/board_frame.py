@@ -54,9 +54,10 @@ class BoardFrame:
     def continues(self, told: Pose, gap: Covariance) -> bool:
         """Return whether a pose continues the board's frame, although its counter began anew.
 
-        The board may have restarted, or the previous pose was damaged. A restart takes longer than
-        a period, so the board did not restart if no displacement was lost since the last accepted
-        pose. The result is True if none was lost, and the pose is near the expected place.
+        The cause is a restart of the board, or a damaged pose just before this pose. A restart
+        takes longer than a period, so the board did not restart if no displacement was lost since
+        the last accepted pose. The result is True if none was lost, and the pose is near the
+        expected place.
 
         ``gap``: covariance of the motion that was lost since the last accepted pose.
         """
@@ -101,7 +102,7 @@ class BoardFrame:
 def is_begun(deviation: Pose) -> bool:
     """Return whether a pose shows by its value alone that the board began a new frame.
 
-    ``deviation``: from the pose that is expected if the board began at zero.
+    ``deviation``: of the pose from the pose that is expected if the board began at zero.
     """
     return deviation.way_m <= BEGUN_M and abs(deviation.yaw_rad) <= BEGUN_RAD
 

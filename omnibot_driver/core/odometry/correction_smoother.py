@@ -52,7 +52,7 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` by the part of it that is allowed.
+        """Move ``target`` by a displacement, and ``pose`` by the allowed part of this displacement.
 
         ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
         """
