@@ -148,8 +148,8 @@ class Health:
     def outlives(self) -> None:
         """Record that the server answered a stop late, after the driver had used the stop port.
 
-        The stop port may still wait for the end of the motion that it should stop. It may then hang
-        during the next motion.
+        The stop port may still wait for the end of the motion that it should stop. The port may
+        then hang during the next motion.
         """
         self.outlived, self._may_be_restarted = True, False
 

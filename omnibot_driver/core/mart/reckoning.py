@@ -140,8 +140,8 @@ class Reckoning(CorrectedPose):
     def rest(self, longest: float = math.inf) -> float:
         """End the motion. Call this after its last encoder count, which includes the coasting.
 
-        Return the wheel's angle of a turn minus an implausible angle of the server, in rad;
-        otherwise 0.
+        If the server has reported an implausible angle of a turn, return the wheel's angle minus
+        the server's angle, in rad. Otherwise, return 0.
 
         ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
         """

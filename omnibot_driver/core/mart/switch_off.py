@@ -23,8 +23,8 @@ MOST_MISSES, MOST_MISSES_DISTURBED = 4, 8
 """Number of unanswered requests after which the driver no longer tries to switch off the motors.
 
 The limits are for a server that does not answer MCS. ``MOST_MISSES_DISTURBED`` applies to a network
-that loses other replies, too. If it loses one datagram of five, four exchanges in a row fail once
-in sixty times.
+that loses other replies, too. If a network loses one datagram of five, four exchanges in a row fail
+once in sixty times.
 """
 NO_MCS: Final = (
     "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"
@@ -62,7 +62,7 @@ class SwitchOff:
         self.needed = not self._refused
 
     def begins(self, *, straight: bool) -> None:
-        """Record that a motion begins. It sets both motors anew, so an earlier need for MCS ends.
+        """Record that a motion begins. The motion sets both motors: an earlier need for MCS ends.
 
         ``straight``: whether it is a straight controlled move, after which a motor may stay on.
         """

@@ -18,8 +18,8 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
-A robot is assumed to be held if it is clearly slower than all its recent set-points: those in
-effect while the displacement was measured, or in the RISING_S before.
+A robot is assumed to be held if, in a displacement, it is clearly slower than all its recent
+set-points. These were in effect during the displacement, or in the ``RISING_S`` before it.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
