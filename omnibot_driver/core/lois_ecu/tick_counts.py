@@ -37,10 +37,10 @@ After a shorter time, the wheels may also have rolled back.
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s since the last tick report that the driver assumes when the unit of the board's
-clock becomes unknown.
+"""Limit, in s, for the time since the last tick report. When the unit of the board's clock becomes
+unknown, the driver replaces a longer time by this limit.
 
-The assumed time limits how far the wheels may have rolled back.
+The time determines how far the wheels may have rolled back.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.

@@ -103,7 +103,7 @@ def outside(
 
 
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
-    """Return whether the motion is near the straight line between two successive set-points.
+    """Return whether the motion is near a set-point, or near the line from one to the next one.
 
     Such motion is inside the envelope. The caller makes this quick check before the exact one,
     ``outside``.

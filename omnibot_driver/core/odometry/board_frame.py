@@ -102,7 +102,7 @@ class BoardFrame:
 def is_begun(deviation: Pose) -> bool:
     """Return whether a pose shows by its value alone that the board began a new frame.
 
-    ``deviation``: of the pose from the pose that is expected if the board began at zero.
+    ``deviation``: difference from the pose that is expected if the board began at zero.
     """
     return deviation.way_m <= BEGUN_M and abs(deviation.yaw_rad) <= BEGUN_RAD
 
