@@ -15,8 +15,8 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Assumed age in s of the values in an odometry report when its last line arrives. The board takes
-the values before it sends the first line."""
+"""Assumed age in s of the values in an odometry report, when the report's last line arrives. The
+board takes the values before it sends the first line."""
 DOUBT: Final = 3.0
 """Largest usual difference between a reported and an expected value, in standard deviations. After
 a larger difference, the filter increases the variance of its estimate."""
@@ -37,7 +37,7 @@ starts."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported
-and an expected speed, with a constant set-point and gains from the user."""
+and an expected speed. It applies if the set-point is constant, and the user has set the gains."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks that the driver subtracts from a wheel's distance when the wheel has come to
 rest. The wheel has rolled less far than its last reported speed suggests."""

@@ -16,8 +16,8 @@ HEARD_S: Final = 0.008
 """Assumed time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""``STEP_S``, ``FIRMWARE_STEP_S``: period of the speed controller in s, in the manual and in the
-public firmware."""
+"""``STEP_S``, ``FIRMWARE_STEP_S``: period of the speed controller in s. ``STEP_S`` is the period in
+the manual, ``FIRMWARE_STEP_S`` the period in the public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 

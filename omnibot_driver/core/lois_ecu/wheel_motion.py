@@ -14,8 +14,8 @@ from omnibot_driver.core.lois_ecu.wheel_model import HEARD_S, CommandKind, Wheel
 
 WAY, SPEED, PUSH, COUNT, HELD = range(5)
 PER_WHEEL: Final = 5
-"""Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
-tick count shows in m, and last measured speed in m/s."""
+"""Number of states of a wheel. The states are: distance in m, speed in m/s, acceleration in m/s²,
+distance in m that the tick count shows, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 """Indices of the body's states. ``BIAS`` and ``EXCESS`` are those of the left wheel; those of the
 right wheel follow.

@@ -16,9 +16,8 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""Number of starts in a row of a backward drive (B) or a turn (R, L) that do not turn the right
-wheel, after which the driver gives up. Each of them may turn the left wheel, and so move the
-robot."""
+"""After this number of starts in a row that do not turn the right wheel, the driver gives up a
+backward drive (B) or a turn (R, L). Each start may turn the left wheel, and so move the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 

@@ -48,7 +48,7 @@ does not turn back and forth.
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. If more are needed, the driver gives the goal up.
 
-A straight move that takes too long sets the number to zero (``Move.cut``).
+After a straight move that takes too long, the moves are counted from zero again (``Move.cut``).
 """
 
 

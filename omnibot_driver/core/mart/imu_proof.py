@@ -77,7 +77,8 @@ class ImuProof:
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
         """Evaluate the reply to a check; return False if the caller must evaluate it.
 
-        The caller evaluates all failures except a dead IMU, and a server without RST IMU.
+        This method evaluates successes and two failures: the IMU is dead, or the server does not
+        know RST IMU. The caller must evaluate all other failures.
 
         ``took_s``: time from the check to the reply, in s.
         """

@@ -82,7 +82,7 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add ``slope`` and ``offset`` to the slope and the offset of the line.
 
-        For a motor that was not measured: its line then changes like that of the other motor.
+        If a motor was not measured, the caller changes its line like the line of the other motor.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

@@ -47,9 +47,10 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Time in s since the last voltage query (VOLTS) after which the next one is sent in any case.
+"""Time in s since the last voltage query (VOLTS), after which unanswered requests no longer delay
+the next VOLTS.
 
-Earlier, VOLTS waits after unanswered requests (see ``_may_ask_volts``).
+Until then, VOLTS waits after an unanswered request (see ``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.

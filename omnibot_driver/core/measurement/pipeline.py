@@ -55,7 +55,7 @@ class MeasurementPipeline:
         )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
         """Reads whose readings are not counted yet. Each entry has the readings of one read, and
-        the age in s that the newest of them had on arrival."""
+        the age in s of the newest reading on arrival."""
         self.undigested: list[Stamped] = []
         """Stamped readings that wait for ``flush``."""
 

@@ -213,7 +213,7 @@ class Uncertainty:
 
 
 def _unheard_variance(acceleration: float, fastest: float, until_s: float, from_s: float) -> float:
-    """Return by how much the variance of a gap increases while it grows to ``until_s``."""
+    """Return by how much the variance of a gap increases while the gap grows to ``until_s``."""
     before, after = (
         min(acceleration * duration_s * duration_s / 4, fastest * duration_s) ** 2
         for duration_s in (from_s, until_s)
