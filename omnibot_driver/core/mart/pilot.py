@@ -50,7 +50,8 @@ VOLTS_S: Final = 10.0
 """Time in s since the last voltage query (VOLTS), after which unanswered requests no longer delay
 the next VOLTS.
 
-Until then, VOLTS waits after an unanswered request (see ``_may_ask_volts``).
+The limit does not apply in the first STARTS_UP_S after a motion, because a turn on the spot sends no
+VOLTS, however long it lasts (see ``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -260,9 +261,9 @@ class Pilot(Hearing):
         VOLTS crashes a server that is starting up. So VOLTS waits after an unanswered request,
         because the server may have been restarted.
         """
-        quiet_s = min(
-            self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S
-        )
+        asked_s = self._polls.asked_s(words.VOLTS)
+        longest_s = max(asked_s + VOLTS_S, self._rested_s + STARTS_UP_S)  # a turn asks for none
+        quiet_s = min(self.conversation.missed_s + STARTS_UP_S, longest_s)
         return now >= max(self.appeared_s + VOLTS_AFTER_S, quiet_s)
 
     def _poll(self, now: float) -> Packets:

@@ -151,6 +151,23 @@ def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_
     assert bench.robot.stands
 
 
+@pytest.mark.parametrize("boot_s", [0.1, 0.2, 0.4])
+def test_a_restart_just_after_a_long_turn_on_the_spot_does_not_crash_the_server(
+    boot_s: float,
+) -> None:
+    """The server restarts at rest, before it was asked for the voltage after a turn of 12 s.
+
+    A reply is missing, so the driver does not send VOLTS yet, although the last one was long ago.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.0, 0.5, 12.0)
+    bench.try_command(0.0, 0.0)
+    bench.run(0.32)
+    bench.server.restart(boot_s)
+    bench.run(2.5)
+    assert not bench.server.crashed
+
+
 def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
     """Return a bench whose server was restarted during a move, 8 s ago.
 
