@@ -4,9 +4,11 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import Final, Literal
 
 OnExit = Literal["stop", "pause", "reset"]
+LEAVING: Final = "the driver is shutting down; start it again"
+"""Why requests and commands are refused, and pending requests fail, when the driver ends."""
 
 
 class Request(Enum):

@@ -14,7 +14,7 @@ from omnibot_driver.core.commands.set_points import Setpoint
 from omnibot_driver.core.imu.gyro_calibration import GyroCalibration
 from omnibot_driver.core.liveness import Liveness
 from omnibot_driver.core.mode_manager import ModeManager, Phase
-from omnibot_driver.core.requests import Request
+from omnibot_driver.core.requests import LEAVING, Request
 
 NOT_OPEN: Final = "the port is not open; connect the board, then call again"
 NO_VALID_DATA: Final = "no valid data from the board; check its power and cable, then call again"
@@ -43,7 +43,7 @@ class Interlocks:
 
     def why_not_request(self) -> str:
         """Return the reason why requests are refused now; empty if they are allowed."""
-        return "the driver is shutting down; start it again" if self.leaving else self.missing
+        return LEAVING if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
         """Record that a motion command was refused; call this for every refused command.

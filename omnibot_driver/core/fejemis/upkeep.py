@@ -17,6 +17,7 @@ from omnibot_driver.core.fejemis.ports import ROLES, Ports
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.steering import Geometry
 from omnibot_driver.core.packets import Packets
+from omnibot_driver.core.requests import LEAVING
 
 GEOMETRIES_DIFFER_M: Final = 0.002
 
@@ -56,7 +57,7 @@ class Upkeep:
         """
         self._leaving = True
         self.machine.off()
-        self.jobs.cancel("the driver is shutting down; start it again")
+        self.jobs.cancel(LEAVING)
 
     def restarted(self, role: Role) -> None:
         """Configure the board ``role`` again, because it has restarted.

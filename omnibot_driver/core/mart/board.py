@@ -24,6 +24,7 @@ from omnibot_driver.core.mart.states import State
 from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import NOTHING_MEASURED, NoticeReading, Reading
+from omnibot_driver.core.requests import LEAVING
 from omnibot_driver.core.traits import Traits
 
 TRAITS: Final = Traits(
@@ -175,6 +176,10 @@ class MartBoard(Board):
             self._expected_s = now
             readings.append(NOTHING_MEASURED)
         return readings
+
+    def leave(self) -> None:
+        """End the current job, because the driver shuts down."""
+        self._pilot.jobs.cancel(LEAVING)
 
     def reset_odometry(self) -> None:
         """Move the origin of the odometry frame to the robot's current pose."""

@@ -9,6 +9,7 @@ from omnibot_driver.core.mart.goal import docking_inches
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.readings import JobDone
 from omnibot_driver.core.packets import Packet
+from omnibot_driver.core.requests import LEAVING
 from omnibot_driver.simulator.mart import Firmware
 
 
@@ -53,6 +54,27 @@ def test_a_job_ends_with_the_reason_that_ended_it() -> None:
         (done,) = bench.extras(JobDone)
         assert not done.success
         assert reason in done.message
+
+
+def test_a_job_that_the_shutdown_ends_says_so() -> None:
+    """The driver shuts down during a calibration, and then in the middle of a docking.
+
+    The result names the shutdown, not the stop that follows. The docking robot is stopped.
+    """
+    bench = MartBench().ready()
+    bench.board.ask(Job.BIAS, "token", bench.now)
+    bench.run(0.1)
+    docking = MartBench().ready()
+    docking.board.ask(Job.DOCK, "token", docking.now, "DOCK", 40)
+    docking.run_until(lambda: not docking.robot.stands)
+    for each in (bench, docking):
+        each.session.shutdown.begin(each.now)
+        each.settle()
+        each.until_it_stands()
+        each.run(0.1)
+        (done,) = each.extras(JobDone)
+        assert (done.success, done.message) == (False, LEAVING)
+    assert b"SL" in docking.said()
 
 
 def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
