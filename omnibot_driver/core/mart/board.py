@@ -109,7 +109,7 @@ class MartBoard(Board):
                 "Battery (V)": "unknown"
                 if pilot.health.volts is None
                 else f"{pilot.health.volts:.2f}",
-                "Late or duplicate replies": str(pilot.conversation.discarded),
+                "Unmatched replies": str(pilot.conversation.discarded),
                 "Job": pilot.jobs.progress(pilot.now_s),
                 "Goal": pilot.goal_progress,
                 "Motor balance": pilot.motor_balance,

@@ -106,6 +106,8 @@ class Conversation:
     """The exchange of requests and replies with one server.
 
     * ``delay_s``: longest time that a datagram may be on its way, in s.
+    * ``discarded``: number of replies that match no pending request. They are late, duplicate or
+      foreign, or they answer a repeated stop.
     * ``trip_s``: average duration of a query, in s; each unanswered query increases it.
     * ``answered_trip_s``: average duration of answered queries, in s.
     * ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply.

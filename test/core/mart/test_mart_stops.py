@@ -342,6 +342,19 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
     assert len(seen) >= 2 or wish.startswith("goal")
 
 
+def test_the_replies_to_a_repeated_estop_count_as_unmatched_not_as_late() -> None:
+    """The network is good, and the e-stop is latched, so the driver repeats its stops.
+
+    Their replies are unmatched. No other value rises, because no reply is late or duplicate.
+    """
+    bench = MartBench().ready()
+    before = bench.board.figures.own
+    bench.estop(True)
+    bench.run(1.0)
+    after = bench.board.figures.own
+    assert {name for name in after if after[name] != before[name]} == {"Unmatched replies"}
+
+
 def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
     """Someone pushes the robot while the e-stop is latched. The driver sends only stops."""
     bench = MartBench().ready()
