@@ -126,7 +126,7 @@ class Link:
 
     @reconnect_interval_s.setter
     def reconnect_interval_s(self, interval_s: float) -> None:
-        self._reader.reconnect_interval_s = interval_s
+        self._reader.reconnect_after(interval_s)
 
     @property
     def blocked(self) -> bool:

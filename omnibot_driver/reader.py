@@ -82,9 +82,24 @@ class Reader:
                     return
                 self.trouble = str(error)
                 self._tell(partial(self._report, self.trouble))
-                self._closing.wait(self._wait_s)
-                longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
-                self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
+                self._await_next_attempt()
+
+    def reconnect_after(self, interval_s: float) -> None:
+        """Change ``reconnect_interval_s``. A new interval also applies to the wait in progress."""
+        with self._lock:
+            if interval_s != self.reconnect_interval_s:
+                self.reconnect_interval_s = self._wait_s = interval_s
+                self._shared.changed.notify_all()
+
+    def _await_next_attempt(self) -> None:
+        began = time.monotonic()
+        with self._lock:
+            while not self._closing.is_set():
+                if (left_s := began + self._wait_s - time.monotonic()) <= 0.0:
+                    break
+                self._shared.changed.wait(left_s)
+            longest_s = max(LONGEST_WAIT_S, self.reconnect_interval_s)
+            self._wait_s = min(BACK_OFF * self._wait_s, longest_s)
 
     def _attach(self, port: Transport) -> None:
         names = self._session.board.traits.channels

@@ -32,7 +32,8 @@ class SharedSession:
 
     Only ``call``, ``command`` and ``blocked`` may be used without ``lock``.
 
-    * ``changed``: condition variable of this lock, for the pacer and the shutdown.
+    * ``changed``: condition variable of this lock, for the pacer, the shutdown, and a reader that
+      has no port.
     * ``keeper``: the object that runs the guard process; None without a guard.
     * ``write_error``: the error after which nothing more is written, or None.
     """

@@ -68,13 +68,19 @@ def session(*, run: bool = True, obeys: bool = True) -> Session:
     return Session(OmniBot(OmniBotSettings()), settings, run=run, obeys=obeys)
 
 
-def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[Any], None]) -> Link:
+def link_to(
+    url: str,
+    listener: Listener,
+    session: Session,
+    reconnect_interval_s: float = 0.02,
+    **taps: Callable[[Any], None],
+) -> Link:
     return Link(
         session,
         boards.opener(omnibot, {"port": url, "baudrate": 115200}),
         url,
         guard=True,
-        reconnect_interval_s=0.02,
+        reconnect_interval_s=reconnect_interval_s,
         deliver=listener.deliver,
         report=listener.report,
         failed=listener.failed,

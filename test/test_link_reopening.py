@@ -71,6 +71,22 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     link.close("stop")
 
 
+def test_a_shorter_interval_ends_a_wait_that_was_longer(tmp_path: Path) -> None:
+    """The port is missing, and the link waits for an hour before it tries to open it again.
+
+    The interval is then reduced, so the link opens the port that has appeared meanwhile.
+    """
+    listener, ours = Listener(), session()
+    name = tmp_path / "omnibot"
+    link = link_to(str(name), listener, ours, reconnect_interval_s=3600.0)
+    link.start()
+    listener.wait_for(lambda: len(listener.reports) == 1)
+    with PtyBoard(SimulatedBoard(), str(name)):
+        link.reconnect_interval_s = 0.02
+        listener.wait_for(lambda: ours.state == "nominal")
+        link.close("stop")
+
+
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
     """A board that comes back under another device name is found by udev's symbolic link.
 
