@@ -27,5 +27,9 @@ class LinkError(OmniBotError):
     """A port that cannot be opened, read or written at the moment."""
 
 
+class PortInUse(LinkError):
+    """A port that cannot be opened, because another program has locked it."""
+
+
 class ParameterError(OmniBotError):
     """A parameter that is unknown, of the wrong type or out of its range."""

@@ -77,7 +77,7 @@ def explain(url: str, parameter: str, error: Exception) -> str:
             f"no permission to open {url}: join the group dialout with"
             " `sudo usermod -aG dialout $USER` and log in again"
         )
-    if code in (errno.EAGAIN, errno.EBUSY):
+    if is_in_use(error):
         return (
             f"{url} is in use by another program{_owner(url)}, perhaps a second driver; end it"
             f" first (`fuser {url}` names it; the guard of a killed driver ends by itself)"
@@ -91,6 +91,11 @@ def explain(url: str, parameter: str, error: Exception) -> str:
             " its port"
         )
     return f"cannot open {url}: {reason}; check the parameter `{parameter}`"
+
+
+def is_in_use(error: Exception) -> bool:
+    """Return whether the error means that another program has locked the port."""
+    return isinstance(error, OSError) and error.errno in (errno.EAGAIN, errno.EBUSY)
 
 
 def _is_gone(error: Exception) -> bool:

@@ -17,11 +17,11 @@ from typing import Final
 
 import serial
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import LinkError, PortInUse
 from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.kernel_counts import overruns
 from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S, WRITE_TIMEOUT_S
-from omnibot_driver.transports.serial_address import explain
+from omnibot_driver.transports.serial_address import explain, is_in_use
 
 MOST_AT_ONCE: Final = 4096
 PEER_OPTIONS: Final = {
@@ -64,7 +64,8 @@ class SerialPort:
         except LinkError:
             raise
         except Exception as error:  # pyserial's URL handlers can raise any exception
-            raise LinkError(explain(url, parameter, error)) from error
+            kind = PortInUse if is_in_use(error) else LinkError
+            raise kind(explain(url, parameter, error)) from error
         try:
             self._settle_in()
         except (OSError, termios.error) as error:

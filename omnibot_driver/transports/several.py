@@ -3,6 +3,9 @@
 """Several lines of bytes as one transport; each line is one channel.
 
 If a line is missing or blocked, the others still work. Missing lines are opened again.
+
+There is one exception: if another program uses the first line, the others are given up too. So if
+two drivers wait for the same lines, one of them gets all lines.
 """
 
 import select
@@ -11,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Final, Protocol
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import LinkError, PortInUse
 from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.transports import (
     NOT_POLLABLE,
@@ -44,7 +47,8 @@ class Several:
     def __init__(self, openers: Sequence[Opener], retry_s: float = RETRY_S) -> None:
         """Open the lines.
 
-        Raises LinkError if no line can be opened, or if a line does not support ``poll``.
+        Raises LinkError if no line can be opened, if another program uses the first line, or if a
+        line does not support ``poll``.
         """
         self._retry_s = retry_s
         self._lines = [Line(opener) for opener in openers]
@@ -99,10 +103,12 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line was lost or reopened, LinkError if all lines are missing.
+        Raises LinesChanged if a line was lost or reopened, LinkError if all lines are missing, or
+        if another program uses the first line.
         """
         if not self._ready:
-            self._open_missing()
+            if not self._changed:  # the guard process may still have a copy of a line just lost
+                self._open_missing()
             self._ready = self._arrivals.poll(0.0 if self._changed else 1e3 * READ_TIMEOUT_S)
             self._write_what_waits(time.monotonic())
         if self._changed:
@@ -191,6 +197,8 @@ class Several:
                 port = line.opener()
             except LinkError as error:
                 line.trouble = str(error)
+                if channel == 0 and isinstance(error, PortInUse):
+                    raise
                 continue
             if port.descriptors is None or len(port.descriptors) != 1:
                 port.close()

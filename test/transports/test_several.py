@@ -246,6 +246,28 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
         assert "in use" in lines.missing[1]
 
 
+def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
+    ends: Ends, tmp_path: Path
+) -> None:
+    """Two drivers wait for two lines. One driver has the second line, the other one the first.
+
+    The driver without the first line gives up. So the other driver gets both lines.
+    """
+    late = tmp_path / "late"
+    openers = [partial(SerialPort, path, 115200) for path in (str(late), ends.paths[1])]
+    with contextlib.closing(Several(openers, retry_s=0.01)) as second:
+        assert list(second.missing) == [0]
+        late.symlink_to(ends.paths[0])
+        with contextlib.closing(Several(openers, retry_s=0.01)) as first:
+            assert "in use" in first.missing[1]
+            with pytest.raises(LinkError, match="late is in use"):
+                read_on(second)
+            second.close()
+            assert changed(first) == {}
+            with pytest.raises(LinkError, match="late is in use"):
+                Several(openers)
+
+
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
     """A port without a file descriptor cannot be one of several lines: LinkError is raised."""
     with pytest.raises(LinkError, match="does not work for a board with several ports"):
