@@ -219,7 +219,8 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
     """A request is pending when the recording ends. Its answer says that the port was lost.
 
-    Later requests are refused, because the port is not open.
+    Later requests are refused, because the port is not open. The answer to an e-stop does not
+    promise a stop.
     """
     endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
     stop = threading.Event()
@@ -233,6 +234,8 @@ def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
     assert "port was lost" in str([e for e in heard.events if getattr(e, "token", "") == "token"])
     with pytest.raises(RequestRefused, match="not open"):
         replay.call(lambda s, now: s.request(Request.START, "token", now))
+    answer = replay.call(lambda s, now: s.estop(True, now))
+    assert answer == "e-stop latched; a replay writes nothing to a board"
     replay.close("stop")
     assert not heard.failures
 

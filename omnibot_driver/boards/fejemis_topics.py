@@ -279,7 +279,7 @@ class FejemisTopics:
         """
 
         def say(session: Session, now: float) -> str:
-            if not off and (why := _why_not_request(what, session)):
+            if not (off and session.interlocks.obeys) and (why := _why_not_request(what, session)):
                 return why
             try:
                 action(cast(FejemisBoard, session.board).services, now)
@@ -296,7 +296,7 @@ class FejemisTopics:
 
 def _why_not_request(what: str, session: Session) -> str:
     """Return why a topic, device or job (``what``) is refused now; empty if it is allowed."""
-    why: str = session.interlocks.why_not_request()
+    why: str = session.interlocks.why_not_write()
     if not why and session.state == "disconnected":
         why = NOT_CONNECTED
     elif not why and session.state == "connecting":

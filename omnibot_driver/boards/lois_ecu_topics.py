@@ -169,7 +169,7 @@ class LoisEcuTopics:
         self, action: Callable[[LoisEcuBoard, float], None], message: str, response: Any
     ) -> Any:
         def say(session: Session, now: float) -> str:
-            if why := session.interlocks.why_not_request():
+            if why := session.interlocks.why_not_write():
                 return why
             if not session.board.mode.running or session.state == "disconnected":
                 return NOT_HEARD

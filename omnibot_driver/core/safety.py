@@ -13,6 +13,7 @@ not know bytes, or who commands the robot.
 from typing import Final
 
 from omnibot_driver.core.board import Board, Mode
+from omnibot_driver.core.commands.interlocks import REPLAY
 from omnibot_driver.core.commands.pipeline import CommandPipeline
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.liveness import Liveness
@@ -115,6 +116,8 @@ class SafetyStops:
                 self._measurement.inertial.calibration.give_up(
                     "the e-stop was latched during the calibration; call again"
                 )
+            if not self._commanding.obeys:
+                return f"e-stop latched; {REPLAY}"
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open; the stop will be sent when it opens"
             if missing := self._reporter.missing:

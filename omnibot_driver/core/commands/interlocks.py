@@ -17,6 +17,7 @@ from omnibot_driver.core.mode_manager import ModeManager, Phase
 from omnibot_driver.core.requests import LEAVING, Request
 
 NOT_OPEN: Final = "the port is not open; connect the board, then call again"
+REPLAY: Final = "a replay writes nothing to a board"
 NO_VALID_DATA: Final = "no valid data from the board; check its power and cable, then call again"
 
 
@@ -25,6 +26,7 @@ class Interlocks:
 
     * ``leaving``: whether the driver is shutting down and refuses everything.
     * ``missing``: which lines are not open, as a sentence; empty if none.
+    * ``obeys``: False if the session replays a recording, which cannot obey.
     """
 
     def __init__(
@@ -40,10 +42,16 @@ class Interlocks:
         self._calibration, self._liveness = calibration, liveness
         self.leaving = False
         self.missing = ""
+        self.obeys = commanding.obeys
 
     def why_not_request(self) -> str:
         """Return the reason why requests are refused now; empty if they are allowed."""
         return LEAVING if self.leaving else self.missing
+
+    def why_not_write(self) -> str:
+        """Return why a request is refused whose effect no data can show; empty if it is allowed."""
+        replay = "" if self.obeys else f"{REPLAY}; start the driver on the board's port"
+        return self.why_not_request() or replay
 
     def refused(self, now: float) -> None:
         """Record that a motion command was refused; call this for every refused command.

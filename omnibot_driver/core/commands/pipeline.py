@@ -74,7 +74,7 @@ class CommandPipeline:
         self._board, self._axis_signs = board, axis_signs
         self._monitor = MotionMonitor(board.traits.slack_mps, board.traits.slack_radps)
         self._advice = {**ADVICE, **board.traits.advice}
-        self._obeys = obeys
+        self.obeys = obeys
         self.monitored = settings.motion_monitor
 
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
@@ -129,7 +129,7 @@ class CommandPipeline:
             age_s=now - self.policy.commanded_at,
             limited=self.shaper.limited,
             estop=self.policy.latched,
-            monitored=self.monitored or not self._obeys,
+            monitored=self.monitored or not self.obeys,
             trips=self.interlock.trips,
             interlock=self.interlock.reason(now, self.policy.settings.timeout_s),
         )
@@ -181,7 +181,7 @@ class CommandPipeline:
     ) -> list[str]:
         """Compare the robot's motion with the commands; return notices for the user."""
         self.policy.proof.look(reading, now)
-        fault = self._check(reading, estimates, now) if self.monitored and self._obeys else None
+        fault = self._check(reading, estimates, now) if self.monitored and self.obeys else None
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
@@ -190,7 +190,7 @@ class CommandPipeline:
         Several in a row are a fault. ``count``: number of rejected displacements since the driver
         began.
         """
-        if not (self.monitored and self._obeys):
+        if not (self.monitored and self.obeys):
             self._monitor.disregard_refused(count)
             return []
         return self._react_to(self._monitor.count_refused(count, now), now)
@@ -297,7 +297,7 @@ class CommandPipeline:
                 "the origin or a scale of odom has changed, by ~/reset_odometry, a restart of the"
                 " board, `odom_linear_scale` or `odom_angular_scale`"
             )
-        elif self._obeys and any(
+        elif self.obeys and any(
             goal.is_left_by(estimate.pose)
             for estimate in estimates
             if isinstance(estimate, OdometryEstimate)
