@@ -165,7 +165,7 @@ class CommandPipeline:
 
     def pose(self, goal: Pose) -> Command:
         """Return the command to drive to a pose in the odometry frame, which never expires."""
-        return self.shaper.pose(goal), NEVER
+        return self.shaper.pose(goal, before=self.policy.current), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that packets of a request, such as a start, were sent. These command no motion."""

@@ -148,6 +148,8 @@ class GoalSetpoint:
       discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
+    * ``before``: the command in effect. If it has the same goal, this one is its repetition: the
+      smallest distance so far stays known.
     """
 
     authority: Final = Authority.POSE
@@ -162,12 +164,15 @@ class GoalSetpoint:
         check: Callable[[Order], object],
         *,
         direct: bool = True,
+        before: "Setpoint | None" = None,
     ) -> None:
         self.alignment = alignment
         self._direct = direct
         self._goal, self._check = goal, check
         self._order = self.final = GoTo(place)
         self._nearest_m = self._nearest_rad = math.inf
+        if isinstance(before, GoalSetpoint) and before._goal == goal:
+            self._nearest_m, self._nearest_rad = before._nearest_m, before._nearest_rad
         self.check_anew()
 
     def order(self, now: float) -> Order:

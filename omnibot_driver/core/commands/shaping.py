@@ -100,8 +100,11 @@ class CommandShaper:
         self.limited += limited != tuple(rates_radps)
         return SteadySetpoint(by, TurnWheels(limited), self._actuator.is_zero)
 
-    def pose(self, goal: Pose) -> Setpoint:
-        """Return the set-point to drive to a pose in the odometry frame and stay there."""
+    def pose(self, goal: Pose, *, before: Setpoint | None) -> Setpoint:
+        """Return the set-point to drive to a pose in the odometry frame and stay there.
+
+        ``before``: the command in effect.
+        """
         if self._control == "velocity":
             raise self._at_odds(Authority.POSE)
         require_finite("cmd_pose", (goal.x_m, goal.y_m, goal.yaw_rad))
@@ -118,6 +121,7 @@ class CommandShaper:
             self._odometry.alignments,
             self._actuator.is_zero,
             direct=self._control is not None,
+            before=before,
         )
 
     def _at_odds(self, authority: Authority) -> CommandRefused:

@@ -15,6 +15,7 @@ from disobedient_robots import (
 from robots import driving
 from session_bench import STOP, TICK_S, Bench
 
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, SimulatedBoard
 
 WITHIN_S = 0.3
@@ -208,15 +209,31 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """If the robot drives away from its goal, the motion monitor trips, and goals are refused.
-
-    Otherwise a node that repeats its goal could set the robot in motion again.
-    """
+    """If the robot drives away from its goal, the motion monitor trips."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)
     bench.run(2.0)
     assert "moving away" in bench.notices[0]
+    assert bench.session.figures(bench.now).commands.trips == 1
+
+
+def test_a_node_that_repeats_such_a_goal_does_not_set_the_robot_in_motion_again() -> None:
+    """A node repeats its goal ten times a second, and the robot drives away from it.
+
+    The motion monitor trips as early as with a single goal. Then the repetitions are refused.
+    """
+    bench = started(BoardSettings(running=True, control="velocity"), control="position")
+    bench.board.grip(0.4, 0.0, 0.0)
+    for _ in range(10):
+        if not bench.notices:
+            bench.go_to(-0.5, 0.0, 0.0)
+        bench.run(0.1)
+    assert "moving away" in bench.notices[0]
+    for _ in range(20):
+        with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot"):
+            bench.go_to(-0.5, 0.0, 0.0)
+        bench.run(0.1)
     assert bench.session.figures(bench.now).commands.trips == 1
 
 
