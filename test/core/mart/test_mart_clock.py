@@ -71,7 +71,9 @@ def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
     bench.run(2.0)
     assert not bench.board.is_fresh
     assert bench.job(Job.TIME, 1, 1, 1999, 0, 0, 0).success
+    since = len(bench.written)
     bench.command(0.3, 0.3, 5.0)
+    assert sum(data.startswith(b"RM ") for data in bench.said(since)) == 2
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.3, rel=0.05)
     assert sum("clock" in notice for notice in bench.notices) == 1
     assert len(bench.notices) == 1

@@ -174,12 +174,13 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """If the board sends data during a step, the overshoot becomes only a little larger.
+    """Without data from the board, the overshoot of a step is at most 5 %.
 
-    95 % of the overshoots are below 8 %; without data, the limit is 5 %.
+    If the board sends data during the step, 95 % of the overshoots are below 8 %, all below 9 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
+    assert found.overshoot <= 0.05
     begun, sent_s = np.meshgrid(np.arange(0.0, 1.0, 0.1), np.arange(0.0, 0.2, 0.02))
     rpm = answer(plant, found.gains, loop, found.target_rpm, 4.0, begun=begun, sent_s=sent_s)
     overshoots = traits(rpm, found.target_rpm, 0.05).overshoot
