@@ -50,8 +50,8 @@ VOLTS_S: Final = 10.0
 """Time in s since the last voltage query (VOLTS), after which unanswered requests no longer delay
 the next VOLTS.
 
-The limit does not apply in the first STARTS_UP_S after a motion, because a turn on the spot sends no
-VOLTS, however long it lasts (see ``_may_ask_volts``).
+The limit does not apply in the first STARTS_UP_S after a motion: in a turn on the spot, the driver
+sends no VOLTS, however long the turn lasts (see ``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
