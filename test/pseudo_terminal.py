@@ -78,7 +78,7 @@ class PseudoTerminal:
             keyboard.join()
 
     def wait_for(self, text: str) -> None:
-        """Wait until the program draws ``text``.
+        """Wait until the program shows ``text``.
 
         The search begins after the text that the previous call found.
         """

@@ -81,9 +81,10 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """The «Paused» text of an earlier pause by another program does not confirm the user's pause.
+    """The «Paused» text of an earlier pause by another program does not confirm a user's pause.
 
-    The driver's P has resumed the board before this text arrives. So the driver sends P again.
+    The user's pause makes the driver send P, which resumes the board. The text arrives only after
+    this P. So the driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")
@@ -105,9 +106,10 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """A «Paused» text from before a start does not confirm a pause that is requested later.
+    """A «Paused» text that the board sent before a start does not confirm a later pause.
 
-    The text arrives only after the request.
+    The user starts the paused board, and then requests a pause. The text arrives only after this
+    request.
     """
     bench = paused()
     notice = b""

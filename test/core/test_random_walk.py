@@ -248,7 +248,8 @@ def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wa
 ) -> None:
     """After any requests, commands and faults, the robot rests and the board has the wanted mode.
 
-    Every request is answered in time. P goes only to a board that is known to run.
+    Each request gets its answer in time. The driver sends P only to a board that, as far as it
+    knows, is running.
     """
     walk = Walk(seed, latency_s, BoardSettings(boot_time_s=boot_time_s, seed=seed), run=run)
     walk.open()

@@ -85,9 +85,10 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """A request that was not written to a lost port is not written after the port opens again.
+    """If the port is lost before the driver has written a request, it never writes the request.
 
-    The request is a reset, for which the driver writes Stop and R.
+    The request is a reset, for which the driver would write Stop and R. When the port opens again,
+    the driver writes only the opening and S.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -99,7 +100,10 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """During a request, ``wake_at`` is always in the future, also if the board is silent."""
+    """During a request, ``wake_at`` is later than now, so no thread wakes up without need.
+
+    ``wake_at`` is the time by which the session must act again. The board may also be silent.
+    """
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -166,7 +170,8 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
     """The driver sends only one R to a board that needs less than 0.1 s to boot.
 
-    The first «Paused» text may be older than R, but the number of the second shows the restart.
+    The board may have sent its first «Paused» text before it received R, but the number in its
+    second text shows the restart.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()

@@ -38,9 +38,10 @@ def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]
 
 @pytest.mark.parametrize("lost", [20, 25])
 def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
-    """A restart that only the pose shows is not taken for motion in the gap.
+    """If only the pose shows that the board has restarted in a gap, odom does not jump.
 
-    The first delta's count fits by chance. The robot could have driven to the board's new origin.
+    The count of the first delta after the gap fits by chance. The gap is long enough for a drive to
+    the board's new origin.
     """
     odometry, estimates = driven(75, 0.004)
     before = last(estimates)
@@ -54,9 +55,10 @@ def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -
 
 
 def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertainty() -> None:
-    """If the first pose shows a restart in a gap of 1.6 s, odom stays, with a small uncertainty.
+    """If the first pose after a gap of 1.6 s shows a restart, odom keeps its pose.
 
-    Only the distance and turn in which the robot came to rest are uncertain.
+    Its uncertainty is small: only the distance and turn in which the robot came to rest are
+    uncertain.
     """
     odometry, estimates = driven(75, 0.014)
     for number in range(115, 120):
@@ -75,10 +77,10 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     ambiguous: bool, told_m: float, x_m: float
 ) -> None:
-    """A pose exactly at the new origin shows a restart that both counters hide, so odom stays.
+    """A pose exactly at the board's new origin shows a restart, so odom keeps its pose.
 
-    If the pose lies 1 cm beside the origin, or if the counters exclude a restart, the robot drove
-    there.
+    The counters of the board fit a restart as well as a loss of frames. If the pose lies 1 cm
+    beside the origin, or if the counters exclude a restart, the robot drove there.
     """
     odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):
@@ -91,9 +93,10 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
 
 
 def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
-    """A pose at the new origin shows a hidden restart, even if a displacement was lost before.
+    """A single lost displacement before a gap does not hide a restart in the gap.
 
-    The longest gap since the last pose counts, not the first one.
+    A pose at the new origin shows the restart. The odometry checks the longest gap since the last
+    pose, not the first one.
     """
     odometry, estimates = driven(75, 0.016)
     estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
@@ -108,10 +111,10 @@ def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_short_gap(
     ambiguous: bool, x_m: float
 ) -> None:
-    """A pose at the new origin shows a restart that both counters hide in a gap of 0.6 s.
+    """A pose at the board's new origin also shows a restart in a short gap of 0.6 s.
 
-    Odom adds only the assumed motion in the gap. If the counters exclude a restart, the robot drove
-    to the origin.
+    The counters of the board fit a restart as well as a loss of frames. Odom adds only the assumed
+    motion in the gap. If the counters exclude a restart, the robot drove to the origin.
 
     Bug: odom moved to the board's old origin, if the robot could have driven there.
     """
@@ -235,9 +238,9 @@ def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
 ) -> None:
     """If the odometry is reset near the end of a gap, odom does not contain the lost motion.
 
-    After a reset near the beginning, odom contains it. The gap lasts 3 s. The displacement after
-    the gap has an estimate in both cases. Without the lost motion, the pose of this estimate is
-    zero, and its twist is unknown.
+    If it is reset near the beginning, odom contains the lost motion. The gap lasts 3 s. In both
+    cases, the odometry makes an estimate for the displacement after the gap. If this estimate does
+    not contain the lost motion, its pose is zero, and its twist is unknown.
     """
     for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
         odometry, trip = Odometry(SETTINGS), Trip()

@@ -124,7 +124,8 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages match no frame, and how many frames are skipped between matches.
 
-    The comparison begins at the frame, equal to the first message, that gives the fewest errors.
+    The comparison begins at a frame that equals the first message. If several frames equal it, the
+    result with the fewest errors counts.
     """
     starts = [n for n, key in enumerate(sent) if published and same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

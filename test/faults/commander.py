@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool
 
 DRIVE_HZ: Final = 20.0
 FAR_M: Final = 10.0
-"""Distance in m from the robot to the goal for a command of 1 m/s; proportional to the speed.
+"""Distance from the robot to the goal, in m for each m/s of the commanded speed.
 
 No test drives far enough to reach a goal.
 """

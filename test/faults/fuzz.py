@@ -29,7 +29,7 @@ CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
 def odd_float(random: Random) -> float:
-    """Draw any 64-bit float, or one of several usual or special values, such as 0 or NaN."""
+    """Return a random 64-bit float, or one of several usual or special values, such as 0 or NaN."""
     anything = struct.unpack("d", random.randbytes(8))[0]
     usual = (0.0, -0.0, 0.3, -0.3, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"))
     return random.choice((*usual, anything))
@@ -58,12 +58,12 @@ def pose(random: Random) -> PoseStamped:
 
 
 def no_message(random: Random) -> bytes:
-    """Draw random bytes in place of a serialized message. They may happen to be a valid message."""
+    """Return random bytes in place of a serialized message. They may happen to be valid."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
 
 
 def parameters(random: Random) -> SetParameters.Request:
-    """Draw a request that sets a parameter to some value.
+    """Return a random request that sets a parameter to some value.
 
     The parameter may be read-only or unknown, and the value may be wrong.
     """

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Events that discard a goal of position control. The robot must then stand until the next command.
+"""Events that discard a goal of position control.
 
-Each event returns the tick from which the robot must stand.
+The robot must then be at rest until the next command. Each event returns the tick from which the
+robot must be at rest.
 """
 
 import signal

@@ -42,7 +42,7 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 ``GAP_MPS2``: largest acceleration of the robot in a gap of the data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
-"""If one byte in 100 is lost, one of this number of published messages may be wrong."""
+"""The number N in "at most one of N published messages may be wrong", if bytes are damaged."""
 ENDS_WITHIN_S: Final = 2.0
 
 

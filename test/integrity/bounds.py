@@ -28,8 +28,8 @@ class Bound:
 
     ``one_wrong_in_hidden``: the same number for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of the intact frames that must be decoded. 1.0: all of them after the
-    first two; 99.9 % for the chunkings in ``BUSY_LOOPS``.
+    ``delivered``: least share of the intact frames that must be decoded. With 1.0, only the first
+    two intact frames may be missing; for the chunkings in ``BUSY_LOOPS``, 99.9 % suffice.
 
     ``chunkers``: names of the chunkings that have these limits.
     """

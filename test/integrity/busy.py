@@ -2,10 +2,9 @@
 
 """A busy computer: the line is undamaged, but the reading process runs late.
 
-An adapter delivers bytes in *pieces*. A late reader may get several pieces in one read, or a part
-of one.
-
-A *chunker* returns the reads: for each read, the index after its last byte, and the time in s.
+An adapter delivers bytes in *pieces*. One read of a late reader may return several pieces, or only
+a part of a piece. A *chunker* returns the reads: for each read, the index after its last byte, and
+the time in s.
 """
 
 from bisect import bisect_right
@@ -46,7 +45,7 @@ example, single bytes."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:
-    """Draw the delay of one wake-up, in s."""
+    """Return a random delay of one wake-up, in s."""
     late_s = random.expovariate(1.0 / JITTER_S)
     kind = random.random()
     if kind < LATE_SHARE:
@@ -85,7 +84,7 @@ def read(
 ) -> Chunks:
     """Return the chunks that a late reader makes of the bytes that arrive in ``pieces``.
 
-    One read returns at most ``most()`` of the waiting bytes.
+    ``most``: returns the largest number of bytes that the next read may take.
     """
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []

@@ -67,8 +67,8 @@ def row(
 ) -> None:
     """Print a row of the table: the shortest and the longest reaction time.
 
-    The function measures one time for each tick, between two displacements, at which the motion can
-    begin.
+    The motion can begin at any tick between two displacements. The function measures one reaction
+    time for each of these ticks.
     """
     shown = []
     for period_s in PERIODS_S:

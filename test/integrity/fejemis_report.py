@@ -34,14 +34,15 @@ SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""For each fault on lines with checksums: the least share of values that are published, and N.
+"""Limits of the errors under each fault, for lines with checksums.
 
-At most one value in N may be wrong. N = 0 means that no value may be wrong.
+Each element is the least share of values that must be published, and the number N in "at most one
+value in N may be wrong". N = 0 means that no value may be wrong.
 """
 ASTRAY_M: Final = 0.02
 
 Stream = list[dict[int, bytes]]
-"""The bytes of all reads in order. The bytes of one read are stored by the channel's number."""
+"""The bytes of all reads, in order. Each read is a dict of bytes by the number of the channel."""
 
 
 @dataclass(slots=True)
@@ -111,7 +112,7 @@ def drive(sums: bool, seed: int, seconds: float) -> Stream:
 
 
 def play(stream: Stream) -> Iterator[Event]:
-    """Yield what a session publishes from a stream."""
+    """Let a session read a stream. Yield the events that the session publishes."""
     ours, now = session(), 1000.0
     ours.opened(now)
     for both in stream:

@@ -15,12 +15,12 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-If the judge must skip more to find a frame that equals the decoded one, the two may be equal by
-chance. The decoded frame is then wrong if the next one in the same read also needs too large a
-skip.
+If the judge must skip more to find a true frame that equals the decoded one, the two may be equal
+by chance. The judge then also searches for the next decoded frame of the same read. If the skip for
+this frame is also too large, the first decoded frame is wrong.
 """
 REACH_BYTES = 600
-"""Distance in received bytes from the start of the search for a read's frames to the read.
+"""Number of received bytes before a read from which the judge searches for the read's frames.
 
 In the true stream, the search starts another 300 bytes earlier.
 """

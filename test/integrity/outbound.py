@@ -39,7 +39,8 @@ class Bound:
 
     Stray motion and false letters are never allowed.
 
-    ``share``: largest share of the driving time with an uncommanded set-point.
+    ``share``: largest allowed share of the driving time in which an uncommanded set-point is
+    active.
 
     ``long_in``: the number N in "at most one uncommanded set-point of over 2 ms in N control
     frames".

@@ -92,7 +92,7 @@ class Bursts:
 
 
 def _gap(rate: float, random: Random) -> int:
-    """Draw the number of bytes before the next fault."""
+    """Return a random number of bytes before the next fault."""
     return int(math.log(1.0 - random.random()) / math.log(1.0 - rate))
 
 

@@ -27,7 +27,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Least number of trials that end a drive, for each kind of receiver and rate of lost bytes.
 
-With 1 byte in 100 lost, each of the scenes in ``HURRIES`` alone has at least this number.
+All scenes that end a drive have this number together. With 1 byte in 100 lost, each scene in
+``HURRIES`` has it alone.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"

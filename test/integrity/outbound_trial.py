@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-A running board reports motion if the driver sends motion commands, even if the line loses them, or
-if the last received set-point is a motion. A change of state appears in the reports after one or
-two ticks.
+A running board reports motion in two cases: the driver sends motion commands, even if the line
+loses them, or the last received set-point is a motion. A change of state appears in the reports
+after one or two ticks.
 """
 
 import math
@@ -135,7 +135,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip all but the last of the next writes that arrive undamaged and change nothing.
+        """Skip the next writes that arrive undamaged and change nothing, except the last of them.
 
         The skipped writes count as arrived. The last one goes over the line as usual.
         """

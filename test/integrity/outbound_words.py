@@ -11,12 +11,12 @@ Words = tuple[int, int, int]
 class Items:
     """The control frames and letters in a write.
 
-    ``frames``: offset of the last byte, mode and words of each control frame.
+    ``frames``: for each control frame, the offset of its last byte, its mode and its words.
 
-    ``letters``: offset and byte of each letter.
+    ``letters``: for each letter, its offset and its byte.
 
-    ``moves``: whether a control frame is a motion. ``stops``: whether there are control frames, but
-    no motion.
+    ``moves``: whether any control frame is a motion. ``stops``: whether there are control frames,
+    but no motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()

@@ -22,7 +22,7 @@ from omnibot_driver.simulator.omnibot.motors import MotorConstants, WheelGains
 
 SLIP: Final = 0.05
 STEEPEST_PWM: Final = 200.0
-"""Greatest effort against a slope, in PWM steps: 5 % of the motors' full effort."""
+"""Greatest motor effort that a slope requires, in PWM steps: 5 % of the full effort."""
 HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
 """Greatest force of a person's push, in PWM steps. A motor effort of this size balances it."""
@@ -63,7 +63,10 @@ class Outcome:
 
 
 def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
-    """Draw the settings of a robot. Its motors, controllers and scales vary as in real robots."""
+    """Return random settings of a robot.
+
+    Its motors, controllers and scales vary as in real robots.
+    """
     random = Random(f"robot {seed}")
     motors = [
         MotorConstants(

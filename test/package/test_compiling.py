@@ -98,7 +98,10 @@ def test_what_cannot_be_compiled_is_installed_as_it_is(
     reason="no C compiler is installed",
 )
 def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
-    """A first build has compiled modules, a second one has none: the modules are removed."""
+    """A build with compiled modules installs them; a later build without any removes them.
+
+    The compiled modules are in the same place as their sources.
+    """
     assert f"{PACKAGE}: core: compiled" in built(tmp_path, "pass", GOOD)
     assert compiled_modules(tmp_path / "lib") == [MODULE.replace(".", "/") + ENDING]
     assert built(tmp_path, "raise SystemExit(1)", GOOD)

@@ -84,9 +84,9 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """The troubleshooting guide quotes a message of the driver. Each part of it is in the code.
+    """Each message that the troubleshooting guide quotes is in the driver's code.
 
-    Gaps ("…") and colons separate the parts.
+    Gaps ("…") and colons separate the parts of a message. Each part is searched for by itself.
     """
     parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)

@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
 
 
 def draw(axes: Any, firmware: Firmware, name: str, sign: int) -> None:
-    """Draw one driven square, and the region in which the robot is expected at the end."""
+    """Plot one driven square, and the region in which the robot is expected at the end."""
     rig = Rig(nominal(firmware, SEED))
     rig.run(4.0)
     rig.square(SIDE_M, sign)

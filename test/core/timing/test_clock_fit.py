@@ -17,8 +17,8 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: for the number of a tick, the upper and lower bound of its time minus the
-    true time, in s.
+    ``above``, ``below``: functions that return the upper and the lower bound of a tick's time,
+    minus its true time, in s. The argument is the number of the tick.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))

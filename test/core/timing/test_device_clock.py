@@ -284,9 +284,9 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
 
 @pytest.mark.slow
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
-    """An adapter may cut the stream between a displacement and the IMU sample of the same tick.
+    """A displacement has the same stamp as the IMU sample of its tick.
 
-    Both still have the same stamp.
+    An adapter may cut the stream between the two frames.
     """
     for chunker in (ftdi(restarted_by_data=True), bursts, singles):
         stamped = run(Board(seconds=10), chunker, 0)

@@ -42,6 +42,10 @@ def test_what_the_board_keeps_is_unset_by_default() -> None:
 
 @pytest.mark.parametrize("period_s", [0.0, 0.01, 0.6])
 def test_ticks_are_neither_turned_off_nor_rare(period_s: float) -> None:
-    """Without ticks, nothing confirms a stop. So 0 is refused too: to unset the period, omit it."""
+    """The driver refuses a period of the ticks that is 0, too short or too long.
+
+    Without ticks, nothing confirms a stop. To keep the board's own period, the user omits the
+    parameter.
+    """
     with pytest.raises(ParameterError, match=r"ticks_period' must be 0\.05 to 0\.5 s"):
         PARAMETERS.check_all({"ticks_period": period_s})
