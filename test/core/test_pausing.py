@@ -36,7 +36,7 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """For a pause of a paused board, the driver sends no P, which would resume the board.
+    """If the user pauses a paused board, the driver sends no P, because P would resume it.
 
     A new «Paused» text of the board confirms the request.
     """

@@ -27,7 +27,8 @@ SILENCE_S: Final = 1.0
 TRANSIT: Final = 200
 """Largest number of frames that are in transit when a comparison begins.
 
-The board has sent these frames already, but the driver may publish them after the beginning.
+The board has sent these frames before the comparison, but the driver may publish them during the
+comparison.
 """
 REACH: Final = 200
 """Number of sent frames, after the last match, with which a published message is compared.

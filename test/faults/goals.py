@@ -88,7 +88,7 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """Check that the event discards the goal: the robot must stand from the event on."""
+    """Check that the event discards the goal: the robot must be at rest from the event on."""
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)

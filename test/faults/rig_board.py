@@ -18,7 +18,8 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``ports``: returns the driver's port parameters for the symbolic link of the board.
+    ``ports``: returns the parameters that name the driver's ports. Its argument is the symbolic
+    link of the board.
 
     ``old_command``: the bytes of a motion command, with which tests fill the port.
 
@@ -34,7 +35,7 @@ class RigBoard:
 
     ``ends_later_s``: additional time that the driver may take to end.
 
-    ``rests_later_s``: additional time until the robot stands after several simultaneous faults.
+    ``rests_later_s``: additional time until the robot is at rest after several simultaneous faults.
 
     ``deaf_s``: longest time for which the board may ignore its input.
 

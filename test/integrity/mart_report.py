@@ -86,9 +86,9 @@ class Score:
 
 
 def drive(name: str, seconds: float, seed: int) -> Score:
-    """Drive random motions, let the robot stand between them, and return the score.
+    """Drive random motions with periods of rest between them, and return the score.
 
-    While the robot stands, the driver polls sonars and battery.
+    While the robot is at rest, the driver polls sonars and battery.
     """
     random, score = Random(f"{name} {seed}"), Score()
     bench = MartBench(

@@ -83,8 +83,8 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
     """Return about one in ``number`` of all combinations of one choice from each list.
 
-    With three or more lists, each of at least ``number`` choices, any two choices from different
-    lists occur together.
+    With three or more lists, each of at least ``number`` choices, the result has every pair of
+    choices from any two lists.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [

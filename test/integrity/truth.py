@@ -23,7 +23,8 @@ Key = tuple[object, ...]
 class Truth:
     """A true stream: its bytes, their times of arrival in s, and its frames.
 
-    ``frames``: content, index of the first byte, and index after the last byte.
+    ``frames``: for each frame, its content, the index of its first byte, and the index after its
+    last byte.
     """
 
     data: bytearray = field(default_factory=bytearray)

@@ -168,9 +168,9 @@ def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any
 
 
 def test_only_tools_need_what_an_extra_brings() -> None:
-    """Only the tools import libraries of the extras.
+    """Only the tools import libraries of the extras, with one exception: rosbags.
 
-    There is one exception: a replay imports rosbags, and the module that it shares with a tool.
+    A replay imports rosbags, and so does the module that the replay shares with a tool.
     """
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {

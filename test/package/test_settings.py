@@ -96,7 +96,7 @@ def test_ros_reads_each_parameter_file(path: Path) -> None:
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_yaml_reads_the_defaults_in_each_parameter_file(board: str) -> None:
-    """The YAML parser of Python reads each default: it would take 1e-06 for a string."""
+    """Python's YAML parser reads each default with its type: 1e-06 would become a string."""
     rows = boards.load(board).PARAMETERS.by_name
     values = load(f"{board}.yaml")["/**"]["ros__parameters"]
     assert values == {name: rows[name].default for name in values}

@@ -52,7 +52,7 @@ def main(folder: Path) -> None:
 
 
 def _drive(probe: Probe, recorder: Recorder, namespace: str) -> None:
-    """Stand, drive seven sides of squares with an e-stop on the last side, and stand again."""
+    """Rest, drive seven sides of squares with an e-stop on the last side, and rest again."""
     topic, kind, qos = f"/{namespace}/cmd_vel", "geometry_msgs/msg/Twist", QoSProfile(depth=10)
     recorder.types[topic], recorder.offered[topic] = kind, as_recorded(qos)
     recorder.hear(topic, kind, qos)

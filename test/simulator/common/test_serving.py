@@ -124,7 +124,7 @@ def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -
 
 
 def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
-    """A board sends datagrams before a host has sent a request, so their address is unknown.
+    """A board sends datagrams before a host has sent a request, so no host is known.
 
     The simulator drops these datagrams and counts them.
     """
@@ -157,7 +157,10 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
 def test_a_first_port_that_has_no_next_port_is_chosen_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The system chooses the highest port for the first channel. The simulator tries again."""
+    """If the first channel gets the highest port, no port is left for the second channel.
+
+    The system chooses the first port. The simulator then lets it choose again.
+    """
     choices = iter([LARGEST])
 
     class Socket(socket.socket):

@@ -114,7 +114,11 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """After a gyro calibration, ``eer`` or ``setid 0`` replaces the offset, so the yaw drifts."""
+    """``eer`` and ``setid 0`` replace the calibrated offset of the gyro, so the yaw drifts.
+
+    ``eer`` loads the saved configuration, and ``setid 0`` erases the configuration. Before that,
+    ``gyroc`` has calibrated the gyro.
+    """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)

@@ -215,7 +215,7 @@ def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
 
 @BOTH
 def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
-    """A period of 0xfffe requests a message once. A period of 0xffff turns it off."""
+    """A period of 0xfffe requests a message once. A period of 0xffff switches the message off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.TICKS, PERIOD_OFF), SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))

@@ -61,9 +61,9 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """A move without a distance ends at the distance that SDR gives, counted from its start.
+    """A move without a distance ends after the distance that the command SDR gives.
 
-    A move with a distance ignores SDR.
+    The distance is counted from the start of the move. A move with a distance ignores SDR.
     """
     rig = Rig()
     rig.say("TF 0")
