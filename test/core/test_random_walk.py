@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random requests, commands, cuts, losses, restarts and stalls, with rules that always hold."""
+"""A random test: requests, commands and faults of the line in any order.
+
+The tests check rules that must always hold, for example that only fresh commands move the robot.
+"""
 
 import contextlib
 from collections import deque

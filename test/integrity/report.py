@@ -3,7 +3,7 @@
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
 ``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: first seed. All seeds
-should be below 1000, because the OmniBot's decoder was tuned with the others. The exit code is 1
+should be below 1000, because the OmniBot's decoder was tuned with higher seeds. The exit code is 1
 when a bound is missed.
 """
 

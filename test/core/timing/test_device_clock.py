@@ -239,9 +239,10 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """After a restart of the board, the stamps increase, with the same offset from the true times.
+    """After a restart of the board, the stamps increase, with the same offset as before.
 
-    The ticks have another phase, and SEQ is different.
+    The offset is the difference between stamps and true times. After the restart, the ticks have
+    another phase, and SEQ is different.
     """
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)

@@ -14,7 +14,10 @@ from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySett
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 HELD = 4095
-"""Size of the adapter's buffer in bytes, 2.4 s of data. Later bytes are lost."""
+"""Size of the adapter's buffer in bytes, for 2.4 s of data.
+
+While the buffer is full, all further bytes are lost.
+"""
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:

@@ -120,7 +120,7 @@ def speed_word_first(quirks: Quirks) -> bool:
 
 
 def zero_distance_is_unlimited(quirks: Quirks) -> bool:
-    """Return whether TF 0 drives without end."""
+    """Return whether the straight move TF 0, with the distance zero, drives without end."""
     rig = Rig(quirks)
     return rig.ask("TF 0", 60.0) is None and rig.moving
 

@@ -268,7 +268,7 @@ def test_an_unknown_reset_repeats_the_previous_reply() -> None:
     ],
 )
 def test_undocumented_commands_are_known(text: str, answer: str) -> None:
-    """The server understands undocumented commands. The ones in this list start no motor."""
+    """The server understands undocumented commands. The test sends some that start no motor."""
     rig = Rig()
     assert rig.ask(text) == answer
     assert not rig.server.chassis.powered

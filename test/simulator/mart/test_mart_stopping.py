@@ -104,7 +104,7 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """After SL or SS on the stop port has ended a drive, SM or SRM hangs the command port."""
+    """If SL or SS on the stop port has ended a drive, the stop SM or SRM hangs the command port."""
     rig = Rig()
     rig.drive(start)
     rig.stop(stop)
