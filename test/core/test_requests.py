@@ -170,8 +170,8 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 def test_a_board_that_boots_within_a_tenth_of_a_second_is_reset_once(runs: bool) -> None:
     """The driver sends only one R to a board that needs less than 0.1 s to boot.
 
-    The board may have sent its first «Paused» text before it received R, but the number in its
-    second text shows the restart.
+    The board may have sent the first «Paused» text before or after R. The number in the second text
+    shows the restart.
     """
     bench = Bench(BoardSettings(boot_time_s=0.05, running=runs), run=runs)
     bench.open()

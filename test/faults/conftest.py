@@ -20,7 +20,7 @@ def _ros() -> Iterator[None]:
 def lenience() -> dict[str, float]:
     """Return ``grace_s``, ``ends_within_s`` and ``rest_s`` of ``Rig`` for a busy computer, in s.
 
-    A commander that does not stop sends six commands in ``rest_s``, so the rig notices them. ``make
-    faults`` uses the defaults of ``Rig``.
+    A commander that does not stop sends six commands in ``rest_s``, so the rig notices them. The
+    target ``make faults`` uses the defaults of ``Rig``.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}

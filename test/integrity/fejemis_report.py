@@ -34,7 +34,7 @@ SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""Limits of the errors under each fault, for lines with checksums.
+"""Limits for each fault on lines with checksums.
 
 Each element is the least share of values that must be published, and the number N in "at most one
 value in N may be wrong". N = 0 means that no value may be wrong.

@@ -13,8 +13,8 @@ were used for tuning.
 
 ``--loss 0.01``: one byte in a hundred is lost, in either direction.
 
-``--own-periods``: the board sends its reports every 400 ms, as after its boot. Without this option,
-the driver sets the period to 200 ms.
+``--own-periods``: the board keeps its own period of 400 ms for ticks and odometry. Without this
+option, the driver sets the period to 200 ms.
 """
 
 import argparse

@@ -73,7 +73,7 @@ class Scene:
 
     ``linear_scale``: the units (LSB) of a command that mean 1 m/s.
 
-    ``exits_s``, ``killed_s``: the time of the driver's end, on request or by force.
+    ``exits_s``: time at which the driver ends on request. ``killed_s``: time at which it is killed.
 
     ``guard_after_s``: delay from the driver's end to the guard's action.
     """

@@ -27,7 +27,10 @@ ASSIGNMENTS = {"SYMLINK", "GROUP", "MODE", "ATTR{latency_timer}"}
 
 
 def rules(lines: list[str]) -> list[dict[str, tuple[str, str]]]:
-    """Parse each line to keys with their operators and values. Fail for other lines."""
+    """Parse each udev rule into its keys, with their operators and values.
+
+    Fail if a line does not have the form of a rule.
+    """
     parsed = []
     for line in lines:
         tokens = [TOKEN.fullmatch(token) for token in line.split(", ")]

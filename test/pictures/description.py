@@ -103,9 +103,9 @@ class Solid:
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
         """Return the normals of the surface where rays enter or leave the solid.
 
-        ``start``, ``way``, ``at``: origins and directions of the rays, and distances to the
-        surface, in the solid's own axes. ``axis``: for each ray, the axis across the face that it
-        meets. ``sign``: 1 if the rays leave the solid, -1 if they enter.
+        ``start``, ``way``: origins and directions of the rays, in the solid's own axes. ``at``:
+        distances along the rays to the surface. ``axis``: for each ray, the axis across the face
+        that it meets. ``sign``: 1 if the rays leave the solid, -1 if they enter.
         """
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))

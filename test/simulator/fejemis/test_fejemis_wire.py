@@ -157,7 +157,7 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """A host can request or subscribe to each value of the help text by the value's key.
+    """A host can request each value in the help text by its key, or subscribe to the value.
 
     Each reply begins with the key; only the reply to ``ir`` begins with ``irc``.
     """

@@ -205,7 +205,7 @@ def heading_in_reference_moves_only(quirks: Quirks) -> bool:
 
 
 def probe_turns(quirks: Quirks) -> bool:
-    """Return whether the check of a dead IMU (MCR SLOW 0) turns the robot."""
+    """Return whether, with a dead IMU, the IMU check MCR SLOW 0 turns the robot."""
     rig = Rig(quirks, imu_dies_s=0.0)
     assert rig.ask("MCR SLOW 0") == "fail MPU6050 connection lost"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -266,7 +266,7 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
-    """A server that follows the manual has no quirks. No detector finds its quirk."""
+    """A server that follows the manual has no quirks. No detector finds a quirk on it."""
     assert not SEEN[name](DOCUMENTED)
 
 
