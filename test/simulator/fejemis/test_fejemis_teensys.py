@@ -235,7 +235,10 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """A frozen angle sensor repeats its angle; the angle line shows an absent or faulty sensor."""
+    """A frozen angle sensor repeats its angle.
+
+    The diagnosis shows an absent sensor. An error flag shows a sensor that reports an error.
+    """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")
     rig.run(1.0)
