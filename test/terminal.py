@@ -14,7 +14,8 @@ PATIENCE_S = 60.0
 def fill(descriptor: int, words: bytes = b"x", *, full_s: float = 0.2) -> None:
     """Write ``words`` again and again until the descriptor has accepted nothing for ``full_s``.
 
-    The descriptor must not block. One refusal is not enough: the kernel may still move data.
+    The descriptor must not block. After a refused write, the descriptor may accept more data,
+    because the kernel still moves earlier data.
     """
     taken, full = 0, 0
     while full < 100 * full_s:

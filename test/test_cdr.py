@@ -54,7 +54,7 @@ def message_name(message: object) -> str:
 
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
-    """Draw message settings with any noise and with frame names of any length."""
+    """Return random message settings, with any noise and with frame names of any length."""
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
@@ -64,7 +64,8 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 def padded(data: bytes, like: bytes) -> bytes:
     """Return ``data`` with its padding bytes replaced by those of ``like``.
 
-    After the NUL of a string, rclpy puts any bytes up to the next multiple of eight.
+    rclpy does not set the padding to zero: the bytes between the NUL at the end of a string and the
+    next multiple of eight can have any value.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):

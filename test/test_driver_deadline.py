@@ -10,9 +10,10 @@ from omnibot_driver import driver
 def test_without_a_thread_for_its_deadline_a_shutdown_goes_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """At the limit of processes no thread can be started. The shutdown continues without deadline.
+    """The thread of the deadline cannot be started. The shutdown continues without a deadline.
 
-    Otherwise the driver would end without a stop, and only the guard would stop the robot.
+    If the shutdown failed instead, the driver would send no stop, and only the guard would stop the
+    robot. A thread cannot be started when the computer is at its limit of processes.
     """
 
     def refuse(_timer: object) -> None:

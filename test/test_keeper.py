@@ -32,7 +32,7 @@ pytestmark = pytest.mark.usefixtures("no_guard_is_killed_while_it_speaks")
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
     """A suspended guard process does not read the new stop bytes, so the driver replaces it.
 
-    Without the replacement, this guard would later write outdated stop bytes.
+    Without the replacement, the suspended guard would later write outdated stop bytes.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
@@ -94,9 +94,9 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 def test_a_dead_guard_that_cannot_be_replaced_is_told_as_well(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard dies, and no other can be started. The driver reports that there is no guard.
+    """A guard dies, and the driver reports that it starts another one. This start fails.
 
-    The earlier report announces another guard, so alone it would be false.
+    The driver reports the failure, too: the first report alone would be false.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()

@@ -38,7 +38,7 @@ def obey_an_old_stamp(session: Session, data: bytes, now: float) -> None:
 class Topic:
     """The topic cmd_vel of a driver.
 
-    The driver uses the session of the bench. Its clocks show the simulated time of the bench.
+    The driver uses the session of the bench. The driver's clocks show the bench's simulated time.
     """
 
     def __init__(self, bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,9 +81,9 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
     full: bool, terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When a link ends without a proof of rest, its guard discards only the data of a full port.
+    """A link ends without a proof of rest. If the port is full, the guard discards the old data.
 
-    Otherwise, the port may still hold the link's last packets.
+    If the port is not full, it may still hold the link's last packets. The guard keeps these.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

@@ -38,7 +38,7 @@ def test_a_command_that_waited_while_the_pacer_stood_still_is_refused(
 ) -> None:
     """A command that waited while the pacer could not run is refused; new commands are obeyed.
 
-    Here, a thread holds the session's lock.
+    In this test, the pacer cannot run because another thread holds the session's lock.
     """
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()

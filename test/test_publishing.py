@@ -142,7 +142,8 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 ) -> None:
     """Measurements are published only after the simulated clock has begun.
 
-    Stamps increase even while the simulated clock stands, and jump back with the clock.
+    Stamps increase even while the simulated clock does not advance. If the clock jumps back, the
+    stamps jump back, too.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
@@ -246,9 +247,9 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a pause begins and ends within one read, later subscribers get the state "nominal".
+    """The board pauses and starts within one read. The latched state is "nominal" afterwards.
 
-    Another thread publishes "paused" during the read.
+    This also holds if another thread publishes the state "paused" during the read.
     """
     session, publishing = session_with(node)
     published: list[str] = []
@@ -298,9 +299,9 @@ def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> No
 
 
 def test_in_simulated_time_each_kind_of_extra_reading_has_its_own_time(node: Node) -> None:
-    """A reading is older than a reading of another kind that was published before it.
+    """Two readings of different kinds are published, the newer reading first.
 
-    Its stamp is older too: stamps have to increase only within a kind.
+    The older reading gets the older stamp: stamps have to increase only within a kind.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)

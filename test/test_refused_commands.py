@@ -63,9 +63,9 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sender of refused commands is not silent, so its next valid command is refused, too.
+    """The motion monitor has stopped the robot. Motion is refused until the sender is silent.
 
-    The motion monitor has stopped the robot: motion is refused until the sender is silent.
+    A sender of refused commands is not silent. So the driver also refuses its next valid command.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

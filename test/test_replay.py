@@ -163,7 +163,7 @@ def test_time_passes_as_it_did() -> None:
 
 @pytest.mark.parametrize("speed", [100.0, math.inf])
 def test_a_step_of_the_recorders_clock_is_not_waited_for(speed: float) -> None:
-    """If the recorder's clock was set forward by 1000 days, the replay plays 10 s of the pause.
+    """The recorder's clock was set forward by 1000 days. The replay shortens this pause to 10 s.
 
     A notice reports the pause. The stamps are those of the recording.
     """

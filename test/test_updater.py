@@ -14,7 +14,7 @@ from omnibot_driver.diagnostics import _through_updater
 
 
 class Wrapper:
-    """An imitation of the object in which a task of diagnostic_updater writes a status."""
+    """An imitation of the object into which a task of diagnostic_updater writes its status."""
 
     def __init__(self) -> None:
         self.values: dict[str, str] = {}

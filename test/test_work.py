@@ -74,9 +74,9 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """Count the Python calls of ``work`` for each tick of a running board; return the mean counts.
+    """Return how many Python calls ``work`` makes for one tick of a running board, on average.
 
-    The keys are the numbers of bytes that the board sends in a tick.
+    The keys of the result are the numbers of bytes that the board sends in a tick.
     """
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}

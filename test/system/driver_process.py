@@ -115,7 +115,7 @@ class Driver:
     def end(self, *signals: signal.Signals) -> int:
         """Send the signals in order, and return the driver's exit code.
 
-        ``lines`` then has all output.
+        Afterwards, ``lines`` contains the complete output of the driver.
         """
         for number in signals:
             self.process.send_signal(number)

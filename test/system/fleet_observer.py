@@ -2,9 +2,9 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. With Fast DDS, a
-process that was a client of a discovery server finds no nodes without a server. So tests run this
-program instead of becoming clients.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. Tests run this program
+because they must not become clients of a discovery server themselves: after that, a process with
+Fast DDS can no longer find nodes without a server.
 """
 
 import sys

@@ -32,14 +32,14 @@ NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 """Options that turn off the middleware's events of subscriptions and publishers.
 
-To wait for these events would take more processor time than the messages.
+A node needs more processor time to wait for these events than to receive its messages.
 """
 
 
 def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
     """Turn off the events of the middleware in all nodes of this process.
 
-    They would take about a tenth of the processor time of a calibration.
+    The events would take about a tenth of the processor time of a calibration.
     """
     for name, events in (
         ("create_subscription", NO_EVENTS),
@@ -52,8 +52,8 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end of the tests.
 
-    The node keeps the middleware's participant: Fast DDS has crashed when the end of a probe
-    deleted the participant.
+    The node keeps the middleware's participant in existence. Without this node, the last probe
+    would delete the participant at its end, and Fast DDS has crashed in such a case.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)
@@ -83,7 +83,7 @@ class Probe:
 
     @classmethod
     def of(cls, driver: Driver) -> Self:
-        """Return a probe of a driver. If an answer to it is lost, it calls the service again."""
+        """Return a probe of a driver. The probe calls a service again if the answer is lost."""
         probe = cls(driver.namespace)
         driver.answers[ANSWER_LOST] = probe.call_again
         return probe
@@ -171,8 +171,8 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again after some seconds, when a stall is over.
 
-        The driver then logs a second refusal, too: it logs each kind of refusal at most once in
-        ``WARN_EVERY_S`` (s).
+        The wait is longer than ``WARN_EVERY_S`` (s), in which the driver logs each kind of refusal
+        at most once. If the driver refuses the message again, this refusal is therefore logged.
         """
 
         def publish() -> None:

@@ -127,7 +127,7 @@ def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
 
 
 def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
-    """Two drivers replay one bag. They publish identical messages, and still run after its end."""
+    """Two drivers replay one bag. They publish identical messages, and run on after the replay."""
     with ExitStack() as stack:
         replays = [replay(stack, drive) for _ in range(2)]
         for driver, probe, _ in replays:

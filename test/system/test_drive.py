@@ -6,7 +6,7 @@ from drive import drive
 
 
 def test_over_a_bad_line_few_messages_are_wrong_and_odom_is_near_the_boards_pose() -> None:
-    """On a line that loses bytes and bursts, at most 3 in 1,000 messages are wrong.
+    """On a line that loses single bytes and whole bursts, at most 3 in 1,000 messages are wrong.
 
     The error of odom stays below 15 cm.
     """

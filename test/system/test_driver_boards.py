@@ -98,9 +98,9 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """A board with few features obeys cmd_vel, and ``ask``, a service of this board alone, answers.
+    """A board with few features obeys cmd_vel. The service ``ask``, which only it has, answers.
 
-    joint_states has the two wheels. /diagnostics has no figures of an IMU.
+    joint_states has the board's two wheels. /diagnostics has no figures of an IMU.
     """
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))

@@ -47,7 +47,8 @@ def probe(shared_probe: Probe) -> Probe:
 def repeated(probe: Probe, publisher: Any, message: object) -> Iterator[None]:
     """Publish a message at 5 Hz while the context lasts.
 
-    The driver logs each kind of refusal at most once in 2 s, so a single message may not suffice.
+    The driver logs each kind of refusal at most once in 2 s. So the refusal of a single message may
+    be missing in the log.
     """
     timer = probe.node.create_timer(0.2, lambda: publisher.publish(message))
     try:

@@ -229,7 +229,8 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 ) -> None:
     """A guard process is killed.
 
-    The driver logs this and starts another one, which also stops the robot.
+    The driver logs this and starts a new guard process. When the driver is then killed, the new
+    guard process stops the robot.
     """
     with probe.commanding(0.3):
         (first,) = driver.guards()

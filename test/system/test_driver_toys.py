@@ -194,7 +194,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
 ) -> None:
     """One of two lines is missing, and the driver reports which one.
 
-    The driver's guard process uses the line that is not missing.
+    When the driver is killed, its guard process stops the robot on the line that is not missing.
     """
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"

@@ -32,7 +32,7 @@ runpy.run_module({module!r}, run_name="__main__")
 def test_it_ends_as_it_does_later(
     module: str, arguments: list[str], library: str, exit_code: int, said: str
 ) -> None:
-    """If the user presses ctrl-C during the imports, the exit code is the same as later.
+    """The user presses ctrl-C during the imports. The exit code is that of a ctrl-C after them.
 
     No traceback is printed.
     """

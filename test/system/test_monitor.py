@@ -188,7 +188,7 @@ def test_the_speeds_of_the_keys_are_tenths_of_the_drivers_limit(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """The speed of the keys depends on the driver's speed limit. It begins at 30 % of this limit.
+    """The speed that the keys command is at first 30 % of the driver's speed limit.
 
     In this test, the driver has a lower limit than the default.
     """

@@ -63,7 +63,7 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Functions that return the reads of a busy computer, by the name of the line.
+"""Functions that return the reads of a busy computer. The keys say how bytes arrive and are read.
 
 The times of the reads contain the computer's delays, so ``stamp`` adds none.
 """
@@ -114,7 +114,10 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Return half the width of the narrowest interval with at least ``part`` of the errors."""
+    """Return half the width of the narrowest interval that contains the share ``part`` of errors.
+
+    With ``part`` = 0.99, the interval contains at least 99 % of the errors.
+    """
     ordered = sorted(errors)
     ends = zip(ordered, ordered[math.ceil(part * len(ordered)) - 1 :], strict=False)
     return min(high - low for low, high in ends) / 2

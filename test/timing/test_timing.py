@@ -79,7 +79,8 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str, skew: float) -> None:
     """The stamps are as accurate as usual if a busy computer reads late.
 
-    Readers that read in parts are left out: some of their stamps are wrong by a tick.
+    The test omits readers that take only some of the waiting bytes in each read. With these
+    readers, some stamps are wrong by a tick.
     """
     stamped = stamp(reader, scenario, 0.0, skew, 0, 10.0)
     assert spread(stamped.errors()) < 0.5e-3

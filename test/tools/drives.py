@@ -190,7 +190,7 @@ class Drive:
 
 
 def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
-    """Return a span from each change to the next one. The last span ends at ``end_s``."""
+    """Return the time spans between changes of a state. The last span ends at ``end_s``."""
     times_s = [at_s for at_s, _ in changes] + [end_s]
     return tuple(
         Span(at_s, until_s, what)

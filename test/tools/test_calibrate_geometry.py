@@ -136,8 +136,8 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 ) -> None:
     """``calibrate geometry`` finds the sizes of a robot in simulated time.
 
-    The slip reduces the expected wheel radius. The result does not depend on the driver's
-    parameters.
+    If the wheels slip, the test expects a smaller wheel radius. The result does not depend on the
+    driver's parameters.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}

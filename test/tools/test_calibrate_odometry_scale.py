@@ -140,9 +140,9 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
     shown: str, found: dict[str, float]
 ) -> None:
-    """The tool writes the balance of the motors to the file, if the driver has measured it.
+    """The tool saves ``motor_balance``, the ratio of the motors' speeds, if the driver measured it.
 
-    The balance is unknown until the robot has driven forward.
+    The driver does not know this ratio until the robot has driven forward.
     """
     robot = Encoder(motor_balance=1.0)
     robot.diagnosed = {"Motor balance": shown}.__getitem__

@@ -90,9 +90,9 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """The tool discards the measurement of a speed in which the logged commands have a gap.
+    """The tool discards the measurement of a speed if the logged commands for it have a gap.
 
-    The driver's command timeout may have stopped the robot.
+    The driver's command timeout may have stopped the robot during the gap.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``calibrate step`` with a real driver: it finds, reports, draws and saves a motor."""
+"""Tests of ``calibrate step`` with a real driver: it finds and saves the constants of a motor."""
 
 from pathlib import Path
 from types import SimpleNamespace

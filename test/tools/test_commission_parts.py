@@ -223,8 +223,8 @@ def resting(
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
     """A turn by hand is accepted only if it is to the left and large enough.
 
-    ``require_left_turn`` measures about the vertical, without the gyro's bias, and raises
-    Contradiction for other turns.
+    ``require_left_turn`` computes the turn about the vertical from the gyro, without its bias. For
+    a turn to the right or a small turn, it raises Contradiction.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 

@@ -24,9 +24,9 @@ def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
 
 
 def test_one_that_is_only_listened_to_does_not_run() -> None:
-    """A driver whose topics have only subscribers is not running.
+    """Topics of a driver that have only subscribers are no sign of a running driver.
 
-    A tool has subscribed to the topics, so they exist. But no program publishes on them.
+    The topics exist because a tool has subscribed to them, but no program publishes on them.
     """
     counts = {"/a/state": 1, "/a/estop_active": 1, "/b/state": 0, "/b/estop_active": 0}
     node = SimpleNamespace(

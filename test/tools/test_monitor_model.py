@@ -156,7 +156,7 @@ def test_what_was_measured_once_is_not_what_is_measured() -> None:
     ],
 )
 def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: list[str]) -> None:
-    """The view reports a silent topic as missing only if the board sends its data in this state.
+    """The view reports a silent topic as missing only if data are expected in the driver's state.
 
     ``state``: the driver's state. ``missing``: the topics that are reported.
     """

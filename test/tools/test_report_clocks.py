@@ -99,7 +99,10 @@ def test_a_step_of_the_drivers_clock_is_told_as_that() -> None:
 
 
 def test_messages_that_waited_once_are_not_a_step_of_a_clock(drive: Drive) -> None:
-    """The recorder is busy for 2 s. All messages of this time arrive at its end."""
+    """The recorder is busy for 2 s, then gets all IMU messages of this time at once.
+
+    The report finds a delay, but no step of a clock.
+    """
     waiting = (drive.imu.stamp_s > 8.0) & (drive.imu.stamp_s < 10.0)
     drive.imu.late_s[waiting] = 10.0 - drive.imu.stamp_s[waiting]
     assert not [one for one in judge(drive.log()) if "clock" in one.text]
@@ -107,7 +110,10 @@ def test_messages_that_waited_once_are_not_a_step_of_a_clock(drive: Drive) -> No
 
 
 def test_a_delay_that_ends_is_not_a_step_of_a_clock(drive: Drive) -> None:
-    """For 1.5 s, all messages arrive 0.5 s later. A few are lost, then the delays are as before."""
+    """For 1.5 s, all messages arrive 0.5 s later. Then a few are lost, and the delay ends.
+
+    The report does not take this for a step of a clock.
+    """
     for topic in (drive.imu, drive.odom):
         topic.late_s[(topic.stamp_s > 8.0) & (topic.stamp_s < 10.0)] += 0.5
         topic.drop(9.5, 10.0)

@@ -251,7 +251,7 @@ def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
 
 
 def test_robots_of_the_same_kind_have_the_same_expected_rate(drive: Drive) -> None:
-    """A recording has two MARTs, and one of them sends too much. The report finds it."""
+    """A recording has two MARTs. The report warns of the one whose odometry has too high a rate."""
     found = judge(beside(drive, MART, MART))
     (odom,) = [one for one in found if one.text.startswith("The rate of odom")]
     assert odom.level is Level.WARN

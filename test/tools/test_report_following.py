@@ -81,7 +81,7 @@ def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
 def test_commands_that_always_change_give_no_advice_on_scales(wheels: tuple[str, ...]) -> None:
     """If the commands always change, the only advice is to record constant commands.
 
-    The report gives the ratios of the speeds in a note.
+    The report gives the ratios of measured to commanded speed only in a note.
     """
     commands = wave(3.0)
     found = verdict(commands, behind(commands, 0.5), wheels)
@@ -94,7 +94,8 @@ def test_commands_that_always_change_give_no_advice_on_scales(wheels: tuple[str,
 def test_a_speed_that_still_swings_gives_no_advice_on_scales() -> None:
     """The speed swings about the commanded speed for longer than each command lasts.
 
-    Its mean is 15 % too high. The report gives the ratio in a note.
+    The mean speed is 15 % too high. The report gives the ratio of measured to commanded speed only
+    in a note.
     """
     commands = stretches(3.0)
     swing = 1.15 + 0.2 * np.sin(2 * np.pi * TIMES_S / 1.5)

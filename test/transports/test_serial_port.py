@@ -108,10 +108,10 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A port makes a real terminal, but not a pseudo-terminal, exclusive until the port is closed.
+    """A port on a real terminal makes the terminal exclusive until the port is closed.
 
     While the terminal is exclusive, only root can open it again. This also keeps out programs that
-    use no locks.
+    use no locks. A pseudo-terminal is not made exclusive.
     """
 
     def exclusive() -> bool:

@@ -25,8 +25,8 @@ from omnibot_driver.transports.several import Several
 class Ends:
     """The ends of two lines: ``far`` has the boards' ends, ``near`` has the driver's ends.
 
-    ``paths``: links to the driver's ends. A lost line has no link: another program may get a
-    terminal of the same name.
+    ``paths``: symbolic links to the driver's ends. The link of a lost line is removed, because
+    another program may get a terminal with the same name.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -184,7 +184,8 @@ def test_a_host_that_is_not_known_is_reported() -> None:
 class Names:
     """A name service in which ``robot.local`` has the addresses ``addresses``, or is unknown.
 
-    ``lookups``: one permit for each lookup of this name. ``gate``: lookups wait until it is set.
+    ``lookups``: semaphore that each lookup of this name releases once. ``gate``: event for which
+    each lookup waits.
     """
 
     def __init__(self) -> None:
@@ -204,7 +205,7 @@ class Names:
         return [each for ip in self.addresses for each in self._real(ip, *more, **options)]
 
     def wait_for(self, lookups: int, transport: UdpPorts) -> None:
-        """Read until this number of further lookups has begun. No data must arrive."""
+        """Read until ``lookups`` more lookups of the name have begun. No data must arrive."""
         end = time.monotonic() + PATIENCE_S
         while lookups:
             assert transport.read() == (0, b"")

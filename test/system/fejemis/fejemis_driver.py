@@ -39,7 +39,7 @@ def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> 
 
 
 def moves_again(probe: Probe, robot: TwoPorts) -> None:
-    """Command the robot until it moves, then wait until it stands. Fail if it does not move."""
+    """Command the robot until it moves, then wait until it is at rest. Fail if it does not move."""
     with driven(probe, robot):
         pass
     robot.stands_for_good()

@@ -203,7 +203,7 @@ def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> 
 def test_a_driver_that_ends_does_not_move_the_lift_again(new: New) -> None:
     """Lift commands continue to arrive while the driver stops the robot and ends.
 
-    The driver switches the lift off. After this, it sends the lift no voltage any more.
+    The driver switches the lift off. It does not obey the lift commands that arrive later.
     """
     robot, driver, probe = new
     lift = probe.publisher(Float32, "lift_cmd")
@@ -234,9 +234,9 @@ def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
 def test_a_calibration_of_the_board_ends_the_drivers_own_bias(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """When a calibration has removed the board's bias, the driver's own bias becomes 0.
+    """The board calibrates its gyro and accelerometer. The driver then sets its own biases to 0.
 
-    Regression: the driver still subtracted its bias, so the calibrated readings had an error.
+    Regression: the driver still subtracted its biases from readings that the board had corrected.
     """
     robot = robot_of(stack, tmp_path)
     biases = {"gyro_bias": [0.0, 0.0, 0.1], "accel_bias": [0.0, 0.0, 0.5]}

@@ -77,7 +77,7 @@ def test_a_brush_that_cannot_be_switched_off_now_is_no_success(
 def test_nothing_is_promised_while_both_ports_are_missing(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """The boards are unplugged, one after the other. ``~/brush`` (off) and a request both fail."""
+    """Both boards are unplugged. ``~/brush`` (off) and ``~/save_configuration`` fail."""
     robot.unplug(DRIVE)
     probe.wait_for_state("connecting")
     robot.unplug(FRONT)

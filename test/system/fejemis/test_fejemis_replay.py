@@ -24,7 +24,7 @@ RAW: Final = [
 RECOGNISED: Final = 100
 """Number of packets from each Teensy that a replay needs to recognise the Teensy.
 
-The recording may lack the answers to the driver's first questions.
+The recording may lack the Teensys' answers to the driver's questions at the start.
 """
 
 

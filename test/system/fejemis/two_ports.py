@@ -80,7 +80,7 @@ class TwoPorts(InBatches[SimulatedFejemis]):
         assert found, {**self.facts, "last": self.last()}
 
     def do(self, action: Callable[[SimulatedFejemis], Any]) -> Any:
-        """Call ``action`` with the board between two of its ticks, and return its result."""
+        """Call ``action`` with the board, between two ticks. Return the result of ``action``."""
         with self.lock:
             return action(self.board)
 

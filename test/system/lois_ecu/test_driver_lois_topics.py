@@ -29,9 +29,9 @@ NODE: Final = "omnibot_driver"
 
 
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """A service switches the LED on and off. Another sends the ball command exactly once.
+    """One service switches the LED on and off. Another service sends the ball command exactly once.
 
-    The board may miss the command, but a repetition could drop a second ball.
+    The board may miss the ball command, but a repetition could drop a second ball.
     """
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)

@@ -337,7 +337,8 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 ) -> None:
     """New values of ``range_maximum`` and ``dock_distance`` take effect while the driver runs.
 
-    For 0.1 m (3.9 inches), the driver requests 2 inches: the robot may drive 1.6 times as far.
+    For a ``dock_distance`` of 0.1 m (3.9 inches), the driver requests 2 inches, because the robot
+    may drive 1.6 times as far as requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
@@ -355,7 +356,7 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 
 
 def test_a_distance_beyond_the_maximum_is_published_as_infinite(new: New) -> None:
-    """A wall is 5 m away. Then the user sets ``range_maximum`` to 4 m: the distance is infinite."""
+    """A wall is 5 m away. The user sets ``range_maximum`` to 4 m. The driver publishes infinity."""
     mart, _, probe = new
     ranges = probe.listen(Range, "range/front")
     mart.do(lambda board: setattr(board.server, "front_m", 5.0))

@@ -28,8 +28,8 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """``calibrate step`` finds the constants of both wheels, and sets corrections and gains.
 
-    The robot has marks that are 10 % off, unequal wheels, dead time and backlash. The board's own
-    period is kept.
+    The robot has encoder marks that are 10 % off, unequal wheels, dead time and backlash. After the
+    calibration, the board sends its ticks with the same period as before.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
@@ -97,9 +97,9 @@ def test_values_that_an_ended_measurement_leaves_are_told(
 def test_the_gains_are_tuned_for_the_period_with_which_the_board_sends_its_ticks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_s: float | None, own_ms: int
 ) -> None:
-    """While the board sends ticks, it measures the wheels late. So the tool needs the period.
+    """While the board sends ticks, it measures the wheels late. So the tool needs this period.
 
-    If the user has set no period, the tool uses the one that the driver has measured.
+    If the user has not set ``ticks_period``, the tool uses the period that the driver has measured.
     """
     periods_s: list[float] = []
 
