@@ -35,10 +35,10 @@ sys.exit(pytest.main(sys.argv[1:]))
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_without_the_files_of_one_board_the_rest_still_works(board: str, tmp_path: Path) -> None:
-    """Without the files of one board, all other modules can be imported and some tests pass.
+    """Without the files of one board, all other modules can be imported, and selected tests pass.
 
-    Without the default board, a test of the complete driver passes too. ``__pycache__`` is copied
-    to save time; Python ignores it if the source is missing.
+    Without the default board, a test of the complete driver passes, too. The test also copies the
+    folders ``__pycache__``, to save time. Python ignores a file in them if its source is missing.
     """
     default, *others = boards.PROFILES
     remaining = others[0] if board == default else default

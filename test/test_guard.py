@@ -264,8 +264,8 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
     """The guard distinguishes heartbeats from stop bytes in one pipe, wherever a read ends.
 
-    An ``e`` is a digit in the stop bytes. Outside them, it is a heartbeat of a driver whose e-stop
-    is latched.
+    An ``e`` in the stop bytes is a hexadecimal digit. Any other ``e`` is a heartbeat of a driver
+    whose e-stop is latched.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

@@ -52,7 +52,7 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
     """The pacer, a thread of the link, repeats commands and applies the command timeout.
 
-    So both work even if the caller's thread hangs after a command.
+    So repetition and timeout work even if the caller's thread hangs after a command.
     """
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)

@@ -265,7 +265,7 @@ def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
 
 @pytest.mark.parametrize("axis", ["linear.x", "linear.z", "angular.x", "angular.y", "angular.z"])
 def test_a_twist_that_is_not_finite_anywhere_is_refused_as_it_came(axis: str) -> None:
-    """A twist with an axis that is not finite is refused. The error has the numbers of the axes."""
+    """A Twist with infinity on one axis is refused. The error gives the values of all axes."""
     twist = Twist()
     part, name = axis.split(".")
     twist.linear.y = 0.25

@@ -228,7 +228,7 @@ def test_what_needs_no_stamp_does_not_wait_for_simulated_time(node: Node, value:
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user changes the parameters for the sizes of the wheels while the robot stands.
+    """The user changes the parameters for the sizes of the wheels while the robot is at rest.
 
     The published joint angles do not change.
     """
@@ -247,7 +247,7 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The board pauses and starts within one read. The latched state is "nominal" afterwards.
+    """A pause of the board begins and ends within one read. Later subscribers get "nominal".
 
     This also holds if another thread publishes the state "paused" during the read.
     """
@@ -299,9 +299,9 @@ def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> No
 
 
 def test_in_simulated_time_each_kind_of_extra_reading_has_its_own_time(node: Node) -> None:
-    """Two readings of different kinds are published, the newer reading first.
+    """A reading is published after a newer reading of another kind.
 
-    The older reading gets the older stamp: stamps have to increase only within a kind.
+    It gets an older stamp than the newer reading: stamps have to increase only within a kind.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     _, publishing = session_with(node)

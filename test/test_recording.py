@@ -53,7 +53,7 @@ def bag(
 
 @pytest.mark.parametrize("plugin", StoragePlugin)
 def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlugin) -> None:
-    """The replay reads the same bytes from a bag's folder and from its file, in both formats."""
+    """The replay reads the same bytes from a bag's folder and its file, in SQLite and MCAP."""
     path = bag(tmp_path / "bag", "/omnibot_driver/raw_tx", RX, plugin=plugin)
     (file,) = (found for found in path.iterdir() if found.suffix != ".yaml")
     for place in (path, file):

@@ -85,7 +85,7 @@ def play(tape: Tape) -> Heard:
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
-    """Return the bytes of a moving board, with times. The ``silent`` ticks are left out."""
+    """Return the bytes of a moving board, with times, without the bytes of the ticks ``silent``."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
     found = []
@@ -163,7 +163,7 @@ def test_time_passes_as_it_did() -> None:
 
 @pytest.mark.parametrize("speed", [100.0, math.inf])
 def test_a_step_of_the_recorders_clock_is_not_waited_for(speed: float) -> None:
-    """The recorder's clock was set forward by 1000 days. The replay shortens this pause to 10 s.
+    """The recorder's clock jumps ahead by 1000 days. The replay shortens this time to 10 s.
 
     A notice reports the pause. The stamps are those of the recording.
     """

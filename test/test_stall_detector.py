@@ -2,7 +2,7 @@
 
 """Tests of the stall detector, which finds stalls of the pacer, the thread that repeats commands.
 
-The tests call a command *refused* if ``outlived_by`` returns False: the command may have waited
+In these tests, a command is *refused* if ``outlived_by`` returns False: it may have waited
 during a stall.
 """
 

@@ -4,7 +4,8 @@
 
 Input: ``go V W`` in m/s and rad/s, ``angle DEGREES``.
 
-Output: ``odo X Y YAW`` in m and rad every 400 ms, ``fwl DEGREES`` every 20 ms.
+Output: the pose ``odo X Y YAW`` in m and rad every 400 ms, and the angle of the steered wheel,
+``fwl DEGREES``, every 20 ms.
 """
 
 import argparse

@@ -52,8 +52,8 @@ def leave_events_out(patch: "pytest.MonkeyPatch") -> None:
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end of the tests.
 
-    The node keeps the middleware's participant in existence. Without this node, the last probe
-    would delete the participant at its end, and Fast DDS has crashed in such a case.
+    The node keeps the middleware's participant alive. Without it, the end of a probe could delete
+    the participant, and Fast DDS has crashed in such a case.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)

@@ -65,7 +65,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
 def test_every_topic_comes_out_of_a_bag_as_it_went_in(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """All topics of a drive are written to a bag, in both storage formats.
+    """All topics of a drive are written to a bag, in the format SQLite or MCAP.
 
     The bag then contains the same bytes, times and qualities of service.
     """

@@ -62,7 +62,7 @@ def free_udp_port() -> int:
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
     """16 drivers are clients of a discovery server. An observer, a super client, finds all of them.
 
-    Clients and super clients use no multicast, so the observer finds the drivers by the server.
+    Clients and super clients use no multicast, so the observer finds them through the server.
     """
     port = str(free_udp_port())
     environment = {

@@ -98,7 +98,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """A board with few features obeys cmd_vel. The service ``ask``, which only it has, answers.
+    """A board with few features obeys cmd_vel. Its own service, ``ask``, answers.
 
     joint_states has the board's two wheels. /diagnostics has no figures of an IMU.
     """

@@ -126,7 +126,7 @@ def test_the_bias_is_what_was_set_last(
 ) -> None:
     """A ``gyro_bias`` that a user sets replaces the bias that the driver has refined.
 
-    The value may be equal to the previous value of the parameter.
+    This also holds if the user's value is the same as the previous value of the parameter.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))

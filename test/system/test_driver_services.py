@@ -86,7 +86,7 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """A true on the topic ``estop`` latches the e-stop, even if 50 messages with false follow."""
+    """A message true on the topic ``estop`` latches the e-stop, even if false follows 50 times."""
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
     driver.process.send_signal(signal.SIGSTOP)

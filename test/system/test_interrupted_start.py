@@ -32,7 +32,7 @@ runpy.run_module({module!r}, run_name="__main__")
 def test_it_ends_as_it_does_later(
     module: str, arguments: list[str], library: str, exit_code: int, said: str
 ) -> None:
-    """The user presses ctrl-C during the imports. The exit code is that of a ctrl-C after them.
+    """The user presses ctrl-C during the imports. The exit code is the same as after the imports.
 
     No traceback is printed.
     """

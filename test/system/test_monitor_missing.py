@@ -107,7 +107,7 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
     """Two drivers have the same name.
 
-    The monitor reports this, because its output would mix both.
+    The monitor reports this, because its output would mix the data of the two drivers.
     """
     fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
     measure(fake, Odometry())

@@ -62,9 +62,9 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """An FTDI adapter's timer that never cuts a frame delays the stamps by the duration of a frame.
+    """The timer of an FTDI adapter never cuts a frame. All stamps are late by a frame's duration.
 
-    The driver can determine the timer's phase exactly only from cut frames.
+    The driver can determine the timer's phase exactly only if the timer cuts some frames.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within

@@ -77,7 +77,7 @@ def test_the_whole_walk_finds_what_was_planted(
 def test_a_speed_limit_is_not_taken_for_positional_control(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The tool asks for a higher ``max_linear_speed`` if it is below a speed that the tool needs.
+    """If ``max_linear_speed`` is too low for the test motions, the tool asks for a higher limit.
 
     At the limited speed, the tool could mistake the board for one under positional control.
     """

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``calibrate step`` with a real driver: it finds and saves the constants of a motor."""
+"""Tests of ``calibrate step`` with a real driver.
+
+The tool finds the constants of a motor, and prints, plots and saves them.
+"""
 
 from pathlib import Path
 from types import SimpleNamespace

@@ -58,7 +58,7 @@ class TwoPorts(InBatches[SimulatedFejemis]):
     def plug(self, channel: int) -> None:
         """Open a new terminal and let the channel's link point to it.
 
-        The new terminal usually has another name than the last one.
+        The new terminal usually has another name than the channel's previous terminal.
         """
         with self._plugging:
             self.heard[channel] = bytearray()
@@ -67,7 +67,7 @@ class TwoPorts(InBatches[SimulatedFejemis]):
     def unplug(self, channel: int) -> None:
         """Close the pseudo-terminal of a channel, as if the cable were unplugged.
 
-        The Teensy keeps its last command.
+        The Teensy continues to execute its last command.
         """
         with self._plugging:
             terminal, self._terminals[channel] = self._terminals[channel], None

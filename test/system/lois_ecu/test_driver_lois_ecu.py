@@ -148,8 +148,8 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """``~/reset`` sets the board's tick counts to 0, but the pose in odom continues.
 
-    A pose in odom may differ from the previous one by 0.15 m when the wheels start, because the
-    board reports its tick counts only every 400 ms.
+    When the wheels start, a report may make the pose in odom jump by 0.15 m, because the board
+    reports its tick counts only every 400 ms.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)

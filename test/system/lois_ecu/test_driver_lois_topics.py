@@ -115,7 +115,7 @@ def test_duty_cmd_is_a_topic_of_its_own(
 ) -> None:
     """Duties are commanded, then wheel rates. The diagnostics name the topic that commands.
 
-    Bug: they named ``wheel_cmd`` for both.
+    Regression: the diagnostics named ``wheel_cmd`` for commanded duties, too.
     """
     ecu = ecu_of("firmware", stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", drive_mode="duty"))

@@ -115,9 +115,9 @@ def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
 
 
 def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
-    """The public firmware makes two errors while it sends, and they hardly change the fit.
+    """While the public firmware sends data, it misses some ticks and notices others too late.
 
-    It misses some ticks, and it notices other ticks too late.
+    These two errors hardly change the fit.
     """
     records = starts(PLANT, 8)
     for number, record in enumerate(records):

@@ -97,7 +97,7 @@ def test_values_that_an_ended_measurement_leaves_are_told(
 def test_the_gains_are_tuned_for_the_period_with_which_the_board_sends_its_ticks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, set_s: float | None, own_ms: int
 ) -> None:
-    """While the board sends ticks, it measures the wheels late. So the tool needs this period.
+    """The board measures the wheels late while it sends ticks. The tool needs the sending period.
 
     If the user has not set ``ticks_period``, the tool uses the period that the driver has measured.
     """
