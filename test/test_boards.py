@@ -202,9 +202,9 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
 
 @pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
 def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
-    """A profile omits a parameter that the driver needs. This is refused.
+    """A profile omits a parameter that the driver needs. This is an error.
 
-    The error lists the parameters that a profile may omit.
+    The error message lists the parameters that a profile may omit.
     """
     with pytest.raises(ValueError, match=f"must have the parameters {name}, .* omit .* axis_signs"):
         table("few", FEW, without=("baudrate", name))

@@ -61,7 +61,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """Two guards end early, and the driver replaces each. It reports only the first end."""
+    """Two guards end early. The driver replaces each, but reports only the end of the first one."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)

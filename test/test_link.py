@@ -73,8 +73,8 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 ) -> None:
     """The guard process gets at most ten heartbeats a second, even if the pacer runs more often.
 
-    The driver replaces a guard that leaves many heartbeats unread. At a higher rate, it would also
-    replace a guard that is only slow.
+    The driver replaces a guard that leaves many heartbeats unread. If the driver sent heartbeats
+    more often, it would also replace a guard that is only slow.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")

@@ -48,7 +48,7 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 ) -> None:
     """The port is missing, so the link tries again and again to open it.
 
-    Each wait is 1.5 times the wait before, up to a limit.
+    Each wait is 1.5 times as long as the previous one, up to a limit.
     """
 
     class Timed(Listener):

@@ -314,7 +314,7 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 
 
 def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
-    """A distance sensor has a minimum above its maximum. This is refused.
+    """If a user sets a distance sensor's minimum above its maximum, the parameters are refused.
 
     Otherwise, consumers would discard every measurement of the sensor.
     """

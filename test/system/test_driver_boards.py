@@ -38,7 +38,10 @@ def start_plain(start_driver: Start, port: str | None, **parameters: object) -> 
 
 
 def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
-    """Return the names without the prefix ``home``. Names that every ROS node has are left out."""
+    """Return the names without the driver's namespace, ``home``.
+
+    Names that every ROS node has are left out.
+    """
     of_ros = ("parameter", "type_description", "/rosout", "/tf")
     relative = {name.removeprefix(f"{home}/") for name, _types in found}
     return {name for name in relative if not any(word in name for word in of_ros)}

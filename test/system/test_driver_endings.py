@@ -2,7 +2,7 @@
 
 """Tests of ways in which the driver can end.
 
-It sends Stop last, and its exit code gives the reason.
+The driver sends Stop last, and its exit code gives the reason.
 """
 
 import contextlib

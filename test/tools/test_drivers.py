@@ -50,5 +50,5 @@ def test_one_that_is_only_listened_to_does_not_run() -> None:
 def test_with_a_discovery_server_a_tool_says_that_it_must_be_a_super_client(
     environment: dict[str, str], advised: bool
 ) -> None:
-    """A tool uses a discovery server, but not as a super client. It names the missing setting."""
+    """A tool uses a discovery server, but not as a super client. The advice names the setting."""
     assert ("ROS_SUPER_CLIENT=TRUE" in discovery_advice(environment)) is advised

@@ -281,7 +281,10 @@ def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
 
 
 def two_wheels() -> Recorder:
-    """Return a recorder of two wheels. The left wheel turns at half of its commanded rate."""
+    """Return a recorder that has received the commands and the rates of two wheels.
+
+    The left wheel turns at half of its commanded rate.
+    """
     recorder = Recorder("/")
     for number in range(200):
         rate, stamp = float(number % 50 > 10), SimpleNamespace(sec=number, nanosec=1)

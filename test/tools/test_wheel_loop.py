@@ -78,8 +78,8 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
     """Ms is the largest sensitivity of the control loop, over all frequencies.
 
-    The test computes the sensitivity at a random frequency from the impulse response. It is at most
-    Ms.
+    The test computes the sensitivity at a random frequency from the impulse response. This
+    value is at most Ms.
     """
     ticks = 4000
     pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks), prepend=0.0)

@@ -11,7 +11,7 @@ TITLE = "toy of two lines"
 CHANNELS = (Channel("drive"), Channel("sense", "sense_port"))
 TICK_S = 0.01
 SET_POINT = re.compile(rb"v -?\d+ -?\d+")
-"""Pattern of the lines that the robot obeys. It ignores all other lines, as a real board does."""
+"""Pattern of the lines that the robot obeys. Like a real board, it ignores all other lines."""
 
 
 class LineRobot:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the check of a port's address. It refuses an address that can never be opened."""
+"""Tests of the check of a port's address. The check refuses an address that can never be opened."""
 
 import os
 from pathlib import Path

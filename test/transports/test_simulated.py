@@ -45,7 +45,7 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
 def test_it_needs_no_guard_and_no_kernel() -> None:
     """A simulated board ends with the driver's process, so it needs no guard.
 
-    Its transport has no file descriptors. It does not count overruns.
+    Its transport has no file descriptors, and does not count overruns.
     """
     with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
