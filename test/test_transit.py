@@ -114,7 +114,7 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """A command that waited too long in the driver's own queue is refused, even a first one."""
+    """A command that waits too long in the driver's queue is refused, even a sender's first one."""
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
     assert delay.total_s == pytest.approx(waited_s)

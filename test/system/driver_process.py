@@ -19,7 +19,7 @@ from driver_nursery import Nursery
 PATIENCE_S = 120.0
 """How long a test waits for an event before the test fails, in s.
 
-No test checks how soon the event comes.
+The limit is long, because no test checks how soon an event comes.
 """
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:

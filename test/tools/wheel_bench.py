@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Recorded steps of one simulated wheel, made faster than real time."""
+"""Recorded steps of one simulated wheel. The simulation runs faster than real time."""
 
 import math
 import random

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated LOIS ECU in real time on a pseudo-terminal, for the driver."""
+"""A simulated LOIS ECU that runs in real time. The driver opens its pseudo-terminal."""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
