@@ -97,7 +97,7 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to command motion: the test wants to drive, and the board runs.
+        """Whether motion is commanded: only if the test wants to drive, and the board runs.
 
         Otherwise zeros are commanded: a paused board may take a byte of a motion command for a
         letter such as P.

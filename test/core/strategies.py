@@ -37,7 +37,7 @@ def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
 
 
 def chunkings(data: bytes) -> st.SearchStrategy[list[bytes]]:
-    """Draw ways to divide the bytes into pieces. Some pieces may be empty."""
+    """Return a strategy for lists of consecutive pieces of ``data``. Some pieces may be empty."""
     cuts = st.lists(st.integers(0, len(data)), max_size=30).map(sorted)
     return cuts.map(lambda at: cut(data, at))
 

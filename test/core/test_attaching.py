@@ -48,9 +48,9 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
     lost: tuple[int, ...], turn: float, frame: str
 ) -> None:
-    """Motion that was interpolated before the first two poses agreed is not taken back.
+    """Motion that was interpolated before the first two poses agreed stays in the odometry.
 
-    The driver attaches to a moving robot. The later poses agree with the odometry.
+    The driver starts while the robot moves. The later poses agree with the odometry.
     """
     odometry, trip, missing, estimates = Odometry(SETTINGS), Trip(0.7), 0, []
     for number in range(60):
@@ -69,7 +69,8 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
     """A damaged pose leaves no error, although the next pose seems to show a restart.
 
-    The next pose lies where the odometry expects it, and undoes the error.
+    The damaged pose also has a wrong count, which causes this impression. The next pose lies where
+    the odometry expects it, and removes the error.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):
@@ -154,9 +155,9 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """One pose with an unexpected heading changes nothing. Two in a row show a new earth frame.
+    """One pose with an unexpected heading changes nothing.
 
-    Odom then continues without a jump.
+    Two such poses in a row show a new earth frame. Odom then continues without a jump.
     """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)

@@ -111,10 +111,10 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """Headings of 120° are accepted after a reset of the odometry.
+    """After a reset of the odometry, headings of 120° are still accepted if the robot faces 120°.
 
-    The driver rejects 120° only while it expects north, because a board that faces north may report
-    120° falsely. The reset does not change the expected heading, which is 120°.
+    The reset does not change the heading that the driver expects. The driver rejects 120° only
+    while it expects north, because a board that faces north may report 120° falsely.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry.estimates.pose = (

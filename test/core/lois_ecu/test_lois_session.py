@@ -94,7 +94,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
     """The user resets the board after a drive. The tick counters jump to zero.
 
-    Even 1.2 s of driving are enough to prove the reset.
+    The jump proves the reset, even after a drive of only 1.2 s.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
@@ -108,7 +108,10 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """A reset of tick counters that are already zero is answered as unconfirmed."""
+    """If the tick counters are already zero, the driver answers a reset as unconfirmed.
+
+    Counters that stay zero do not show whether the board has obeyed.
+    """
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -139,9 +142,9 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @pytest.mark.slow
 def test_a_reset_is_not_repeated_after_the_answer_that_it_failed() -> None:
-    """After the answer that a reset failed, the driver does not send the reset again.
+    """A reset is lost. After the driver has reported the failure, it does not repeat the reset.
 
-    When the wire is repaired, a new request succeeds.
+    When the line works again, a new request succeeds.
     """
     bench = Bench("documented")
     bench.drive_on(0.2, 1.2)
@@ -181,9 +184,10 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """For 1.2 s the board sends only a record of 1024 samples, and the record arrives complete.
+    """For 1.2 s the board sends only a record. The state stays nominal, and the record is complete.
 
-    With 120 encoder ticks per turn, the record is soon full.
+    The record has 1024 samples. The wheels have 120 encoder ticks per turn, so the samples are soon
+    recorded.
     """
     bench = Bench(firmware, LoisEcuSettings(ticks_per_revolution=120), steps=120)
     bench.drive_on(0.6, 2.0)
@@ -198,9 +202,9 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
 
 
 def test_a_long_record_is_not_taken_for_damage() -> None:
-    """The board sends the lines of a record, which are valid although they form no report.
+    """While the board sends the lines of a record, no notice about damage appears.
 
-    No notice about damage appears.
+    These lines are valid, although they form no report.
     """
     bench = Bench("firmware")
     board = bench.session.board
@@ -215,7 +219,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """If a board loses power within a line, the notice says "no data", not "no valid data"."""
+    """A board loses power while it sends a line. The notice says "no data", not "no valid data"."""
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)

@@ -34,7 +34,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
     """Return the times in s, within six seconds, at which a wheel is reported as stalled.
 
     * ``ticks``: new ticks of the left and the right wheel in each 0.2 s.
-    * ``ways_m``: distance in m by which the pose of 0x20 moves in each 0.2 s.
+    * ``ways_m``: distance in m by which the board's own pose (report 0x20) moves in each 0.2 s.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -142,9 +142,10 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """Two wheels at about 1.3 times their set-points do not look stalled; one such wheel does.
+    """Two wheels that both turn at about 1.3 times their set-points do not look stalled.
 
-    In backward motion, both wheels can really roll too fast, by about the same factor.
+    In backward motion, both wheels can really roll too fast, by about the same factor. If only one
+    wheel is this fast, it looks stalled.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Terminal modes of a LOIS ECU, in which the board passes on the lines of a sensor.
+"""Terminal modes of a LOIS ECU, in which the board passes on a sensor's lines to the host.
 
 Before the mode changes, the driver stops the robot and refuses motion.
 """
@@ -79,9 +79,10 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The driver reports the end of a terminal mode once, even if the board misses the first lines.
+    """The driver reports once that a terminal mode has ended, even if the board misses some lines.
 
-    The driver also restores the "short correction" that the mode overwrote.
+    The driver also restores the left short correction, which the mode has overwritten. It is a
+    factor in the measurement of the left wheel's speed.
     """
     bench = Bench(firmware)
     configure(bench, GPS)

@@ -75,8 +75,8 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """While the robot drives, the LED's line comes at least 14.5 ms after a motion line.
 
-    The board may miss all bytes for up to 13 ms. It could read the rest of both lines as a wrong
-    motion line.
+    The board may miss all bytes for up to 13 ms. If it missed the end of the motion line and the
+    start of the LED's line, it could read the remaining characters as a wrong motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

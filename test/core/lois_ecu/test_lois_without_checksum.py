@@ -21,9 +21,10 @@ BOOT_SHORT_CORRECTION = 1.0761719
 def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
     firmware: str,
 ) -> None:
-    """A board that restarts in a drive gets a mode line with a checksum, and drives on.
+    """A board that restarts in a drive verifies checksums again, and ignores lines without one.
 
-    After a restart, the board verifies checksums again.
+    The driver sends a mode line with a checksum, which switches the checksums off. The robot then
+    drives on.
     """
     bench = Bench(firmware, LoisEcuSettings(with_sum=False))
     bench.run(5.0)
@@ -39,7 +40,9 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
     """The left short correction keeps its value when settings are written during a drive.
 
-    Bug: the fifth round stopped after the mode line, which sets the correction to almost 0.
+    This correction is a factor in the measurement of the left wheel's speed. Bug: the driver writes
+    the settings five times. The fifth time, it stopped after the mode line, which sets the
+    correction to almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -55,7 +58,7 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
-    """The left short correction is right after each writing, even if lines lose characters.
+    """The left short correction is right whenever settings were written, even on a bad line.
 
     The mode line sets the correction to almost 0. A single line that restored it was often lost.
     """
@@ -77,9 +80,9 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
 def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
     firmware: str, *, with_sum: bool, commands: bool
 ) -> None:
-    """A board that another program left rolling, with the other form of lines, obeys a Stop.
+    """A board that another program left rolling, with the opposite checksum setting, obeys a Stop.
 
-    The Stop comes within half a second of the opening of the port, with or without commands.
+    The Stop arrives within half a second after the port is opened, with or without commands.
 
     Bug: the robot rolled on for seconds, because the board ignored each Stop.
     """

@@ -201,7 +201,7 @@ class MartBench(AnyBench):
     def said(self, since: int = 0) -> list[bytes]:
         """Return the driver's datagrams without its regular queries.
 
-        ``since``: how many datagrams to leave out, counted from the first one.
+        ``since``: number of datagrams to leave out at the beginning.
         """
         return [data for _, data in self.written[since:] if data not in POLLS]
 

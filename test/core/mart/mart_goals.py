@@ -2,8 +2,8 @@
 
 """Goals on a network with faults: helpers of the tests, and a measurement of many goals.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_goals.py 25``: 100 goals for each network.
-Results: docs/internals/mart_protocol.md.
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_goals.py 25``: 25 runs with 4 goals each,
+for each network. Results: docs/internals/mart_protocol.md.
 """
 
 import math
@@ -43,7 +43,7 @@ def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
 
 
 def reach(bench: MartBench, goal: Pose) -> str:
-    """Command the goal, and wait until it is over, or until the session has dropped it.
+    """Command the goal. Wait until the driver reports "over", or the session has dropped the goal.
 
     Return the texts of all notices that came in this time, joined to one text.
     """
@@ -66,7 +66,7 @@ def holds_command(bench: MartBench) -> bool:
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
-    """Command a goal ahead or behind, and return the first requested distance, in inches."""
+    """Command a goal ahead or behind. Return the length of the first straight move, in inches."""
     since = len(bench.written)
     bench.go_to(x_m, 0.0, 0.0)
 

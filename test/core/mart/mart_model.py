@@ -202,7 +202,7 @@ def _waits(world: World) -> Iterator[Step]:
 def sweeps_first(driver: Driver) -> bool:
     """Return whether the driver must first find out which motion is in progress.
 
-    The motion is then unknown, the stop port was used, and no stop was ever confirmed.
+    This is so if the motion is unknown, the stop port was used, and no stop was ever confirmed.
     """
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
@@ -281,9 +281,9 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply may belong to an earlier command. Such a reply is never taken for
-    the answer to a check, a controlled move or MSM. A check or a move takes longer than a reply can
-    be late.
+    ``late``: whether the reply may belong to an earlier command. The driver never takes such a
+    reply for the answer to a check, a controlled move or MSM (end of the direct control). A check
+    or a move takes longer than a reply can be late.
     """
     driver = world.driver
     state = driver.state

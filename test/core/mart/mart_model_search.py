@@ -24,7 +24,7 @@ def trouble(world: World) -> str:
 
     * If the IMU is dead, or if the driver has given up: only a crash of the server is wrong.
     * While the driver finds out which motion is in progress: a crash, or a command port that hangs.
-    * At all other times: these two, and further faults.
+    * At all other times: a crash, a command port that hangs, or one of the other faults.
     """
     server, driver = world.server, world.driver
     if server.crashed:

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 from omnibot_driver.core.mart.states import Motion
 
 START_WORDS: Final = ("RM", "B", "R", "L", "TF", "MCR")
-"""Commands that start a motion. In this model TB behaves as TF, and MCL as MCR."""
+"""Commands that start a motion. TB and MCL are left out: they behave as TF and MCR."""
 SAID: Final = (*START_WORDS, "CHECK", "SRM", "SM", "SL", "SS", "MCS", "MSM")
 KIND: Final = {
     "RM": Motion.REFERENCE,
@@ -110,7 +110,7 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 
 
 def servers() -> dict[Server, tuple[str, ...]]:
-    """Return all states that the server can reach without lost datagrams, each with its steps.
+    """Return all states that the server can reach without lost datagrams, with the steps to each.
 
     A step is a command, or a failure of the IMU, which does not occur during a controlled move.
     """

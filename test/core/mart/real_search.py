@@ -183,7 +183,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
     """Yield trials in which a user commands ``wishes``, and one datagram is disturbed.
 
     The first datagrams of each direction are disturbed, at most ``MOST_DATAGRAMS`` for each wish.
-    There is one trial for each of them and each fate.
+    Each of these datagrams has one trial for each fate.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

@@ -63,7 +63,8 @@ def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
     """After the user has set the server's clock back, the driver starts the next drive twice.
 
-    The server begins this drive (RM, forward) with a heading of about 1e15°.
+    The server begins the first attempt (RM, forward) with a heading of about 1e15°, which the
+    driver cannot use.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

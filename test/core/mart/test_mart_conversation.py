@@ -131,9 +131,9 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """After a lost reply to a sonar query, which may still come late, the next sonar query waits.
+    """After a missing reply to a sonar query, the next sonar query waits: the reply may still come.
 
-    ENC (encoder) is sent at once, but its reply is doubtful.
+    ENC (encoder query) is sent at once, but its reply is doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -154,7 +154,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 def test_every_motion_is_stopped_by_its_own_word() -> None:
     """Each motion has its own stop command, which the driver uses first.
 
-    The stop of a controlled move goes to the stop port, and every other to the command port.
+    The stop of a controlled move goes to the stop port. All other stops go to the command port.
     """
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
@@ -190,7 +190,7 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
     """The reply to a stop that may have overtaken its start does not prove a standstill.
 
-    The reply to a later stop does.
+    The reply to a later stop proves it.
     """
     stop = stopping(Motion.REFERENCE, started_s=9.9)
     assert stop.due(10.0) == (words.SRM,)
@@ -200,9 +200,9 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """Two ``ok`` after a start and a stop do not prove the stop; a later "no motion" does.
+    """Two ``ok`` after a start and a stop do not prove the stop: both may be replies to the start.
 
-    Both may answer the start, because the network may duplicate a reply.
+    The network may duplicate a reply. A later "no motion" proves the stop.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -214,8 +214,8 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
     """Only a reply that cannot be the copy of an earlier reply proves a stop.
 
-    The first stop may overtake the start. A copy of the first reply can arrive until 0.6 s after
-    this stop.
+    The first stop may overtake the start, so its reply proves nothing. A copy of this reply can
+    arrive until 0.6 s after the first stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -312,9 +312,9 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """A first heading after RM (forward drive) that equals the last heading before RM is not used.
+    """If the first heading after RM (forward drive) equals the last one before RM, it is not used.
 
-    RM sets the server's heading to zero.
+    RM sets the server's heading to zero, so an equal heading is a late reply.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))

@@ -66,10 +66,10 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """If the IMU dies in a motion, the driver stops the robot and refuses motion until a restart.
+    """If the IMU dies in a motion, the driver stops the robot and refuses further motion.
 
-    The server variant "source" reports headings only in forward drives, so it is tested only with
-    these.
+    After a restart of the server with a working IMU, motion is allowed again. The server variant
+    "source" reports headings only in forward drives, so it is tested only with these.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

@@ -140,7 +140,8 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() -> None:
     """The server falls silent just before EXIT is sent.
 
-    The result asks for a copy of the file. It does not say "call again", because that cannot help.
+    The result tells the user to copy the file from the controller. It does not say "call again",
+    because that cannot help.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -157,9 +158,9 @@ def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() ->
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
-    """The log can be downloaded after a straight drive.
+    """The log can be downloaded after a straight drive, when the heading is often zero.
 
-    The heading is then often zero, as after a restart, which would have erased the log.
+    A restart of the server also sets the heading to zero, and erases the log.
     """
     for seed in range(3):
         bench = MartBench(firmware, seed=seed).ready()
@@ -295,7 +296,7 @@ FIRST, SECOND = bytes(range(256)) * 2, bytes(reversed(range(256))) * 2
 
 
 def with_swapped_pieces(bench: MartBench) -> None:
-    """Swap FIRST and SECOND once if they arrive in one step."""
+    """Let the bench swap the datagrams FIRST and SECOND once, when both arrive in the same step."""
     inner, swapped = bench.robot.advance, []
 
     def advance() -> list[Packet]:

@@ -92,7 +92,8 @@ def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware, 
 def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
     """If a later HELLO is answered but ENC (encoder query) is not, the driver repeats ENC.
 
-    The server answers in order. ENC is repeated within 0.25 s of the loss.
+    The server answers in order, so the answer to HELLO shows the loss. ENC is repeated within 0.25
+    s.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 3.0)

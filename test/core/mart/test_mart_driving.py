@@ -90,9 +90,10 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """A start that is lost after a curve is sent again.
+    """If the start of a drive after a curve is lost, the driver sends the start again.
 
-    Meanwhile, the server reports the last heading of the curve. The odometry does not turn by it.
+    Meanwhile, the server reports the last heading of the curve. The odometry does not take this
+    heading for a turn.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -155,7 +156,7 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 
 def test_diagnostics_have_the_rate_of_odom() -> None:
-    """/diagnostics contain the rate of odom, because the report compares odom with this rate."""
+    """/diagnostics contain the set rate of odom. The report tool compares the real rate with it."""
     assert MartBench(settings=MartSettings(odom_rate_hz=10.0)).board.figures.odom_hz == 10.0
 
 

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of motions whose start fails.
+"""Tests of motions whose start fails. The driver repeats some of these starts.
 
-Some of these starts are repeated. A server that moves the robot nevertheless is refused.
+If a server rejects a start but moves the robot, the driver refuses motion.
 """
 
 import pytest
@@ -45,7 +45,7 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """If the server obeyed an RM after it rejected one, a push does not show a defective server.
+    """After a rejected RM and then a successful one, a push does not show a defective server.
 
     A defective server rejects RM (forward drive), and moves the robot nevertheless.
     """
@@ -107,9 +107,11 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """A motion by a late copy of a rejected RM (forward drive) does not show a defective server.
+    """A late copy of a rejected RM (forward drive) moves the robot. Later commands are still
+    accepted.
 
-    The network loses replies, too.
+    The driver stops this motion, and does not regard the server as defective. The network loses
+    replies, too.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

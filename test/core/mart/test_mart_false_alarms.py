@@ -23,7 +23,7 @@ The wheels turn for longer after a stop than the server waits for a standstill.
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
-    """The time without a change of the heading begins at the first heading of a drive.
+    """The time without a change of the heading is counted from the first heading of a drive.
 
     Before this heading, which comes 0.7 s after the start, a change cannot be seen.
     """
@@ -102,8 +102,8 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """If a motor is stuck in the turn to a goal, the driver discards the goal.
 
-    "Start timedout" alone is not a sufficient reason: a heavy robot that still moves causes it,
-    too.
+    The server's reply "Start timedout" alone is not a sufficient reason: a heavy robot that still
+    moves causes it, too.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -139,10 +139,10 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn with a wrong rate is started again with other motor units, even without its angle.
+    """A turn with a wrong rate is started again with other motor units.
 
-    The angle is missing if a heavy robot stops too slowly, or if the reply to the stop is late. The
-    encoder then shows the motors' speed.
+    This also holds if the angle of the first turn is unknown. The angle is unknown if a heavy robot
+    stops too slowly, or if the reply to the stop is late. The encoder then shows the motors' speed.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

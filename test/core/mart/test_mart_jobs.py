@@ -157,7 +157,7 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
 def test_a_refused_zero_command_ends_a_docking() -> None:
     """A zero cmd_vel arrives during a docking, but is refused, e.g. because its stamp is too old.
 
-    The driver still ends the docking, because it has no ``cmd_vel_timeout``.
+    The driver still ends the docking, because no ``cmd_vel_timeout`` would end it.
     """
     bench = MartBench().ready()
     bench.board.ask(Job.DOCK, "token", bench.now, "DOCK", 80)

@@ -143,8 +143,8 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """The goal is not discarded although all replies come 0.28 s late.
 
-    After each move, the driver sends a stop, because a second run may have begun. A quick answer
-    shows that there was none.
+    After each move, the driver sends a stop, because the network may have delivered the move twice.
+    A quick reply to this stop shows that no second run has begun.
 
     ``copied``: whether the network duplicates the move. The first run is then added to the
     odometry.
@@ -170,7 +170,8 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     """A late reply to a start is not taken for the reply to the stop after it.
 
-    A copy of the IMU check's ``ok`` has seemed to confirm the start. The stop is lost.
+    A copy of the IMU check's ``ok`` seems to confirm the start. Then the stop is lost, and the late
+    reply to the start arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

@@ -130,8 +130,8 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
     """A server whose process stood still for 5 s while the robot was at rest is driven again.
 
-    The server's answers to old queries are not taken for replies to stops, which would show that
-    the stop port may hang.
+    The server's answers to old queries are not taken for replies to stops. Such replies would show
+    that the stop port may hang.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

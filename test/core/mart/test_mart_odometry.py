@@ -172,9 +172,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """If the count after a second motion equals the count before, the covariance covers two cases.
+    """If a second motion ends with the same count as the first, the covariance covers two cases.
 
-    The second start was lost, or the second motion was equal to the first.
+    Either the start of the second motion was lost, or the second motion was equal to the first.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)

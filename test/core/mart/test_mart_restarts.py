@@ -426,9 +426,10 @@ def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot
 def test_a_quick_restart_at_rest_is_noticed_before_the_next_motion(
     boot_s: float, wait_s: float
 ) -> None:
-    """If the server restarts within 0.5 s while the robot is at rest, the next motion waits for it.
+    """After a restart while the robot rests, the next motion waits until the server is ready.
 
-    After each short silence, the driver waits for the heading, which is zero after a restart.
+    The driver notices even a quick restart, within 0.5 s: after each short silence, it waits for
+    the heading, which is zero after a restart.
     """
     bench = MartBench("source").ready()
     bench.command(0.2, 0.3, 1.5)

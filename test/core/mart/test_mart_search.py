@@ -95,9 +95,9 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The search finds that a driver which sends SRM, a stop, directly after SL hangs the server.
+    """A modelled driver that sends the stop SRM directly after SL (stop port) hangs the server.
 
-    The real driver first queries whether a motion continues.
+    The search finds this failure. The real driver first queries whether a motion continues.
     """
 
     def sweeps(world: World) -> model.Step:

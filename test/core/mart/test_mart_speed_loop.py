@@ -38,9 +38,10 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """The true speed of a faster motor, measured at 14 units, does not lower the learnt line there.
+    """When the true speed at 14 units is measured, the learnt speed at 14 units does not decrease.
 
-    A speed at 26 units that was measured too low has already lowered the line.
+    The motor is faster than expected. Before this, a speed at 26 units was measured too low, which
+    has already lowered the learnt line.
     """
     line = MotorLine()
     for _ in range(8):

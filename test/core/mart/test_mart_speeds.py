@@ -112,7 +112,8 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
     """After something has slowed a turn of 0.5 rad/s, the robot turns at less than 0.9 rad/s.
 
-    After an earlier turn, from which the driver learns, the limit is 0.6 rad/s.
+    ``learned``: whether the driver has learned the motors' speed in an earlier turn. The limit is
+    then 0.6 rad/s.
     """
     bench = MartBench("source").ready()
     if learned:
@@ -153,7 +154,7 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Turns on the spot that are too fast do not change the balance that a drive has shown.
+    """Turns on the spot that are too fast do not change the motor balance measured in a drive.
 
     Motor units are whole numbers, so slow turns are up to 17 % too fast.
     """

@@ -160,7 +160,7 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 ) -> None:
     """A late encoder count is not taken for the reply to the lost stop of a turn.
 
-    The reply would contain an angle, and the count could be one.
+    The reply to the stop would contain an angle, and the count looks like a plausible angle.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
@@ -218,8 +218,9 @@ def test_a_lost_reply_does_not_make_a_stop_look_like_a_restart(number: int) -> N
     """The network has just lost a reply. A drive is stopped as soon as the wheels turn.
 
     The server answers the start and the stop with ``ok``, and then the repeated stop with "no
-    motion". The driver has seen both replies, and the network has not duplicated any. So it does
-    not take the third one for a sign of a restart, and does not switch the motors off by MCS.
+    motion". The driver has seen both ``ok``, and the network has not duplicated any reply. So the
+    driver does not take "no motion" for a sign of a restart, and does not switch the motors off by
+    MCS.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 1.0)

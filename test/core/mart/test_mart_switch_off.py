@@ -85,7 +85,7 @@ def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
 
 
 def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
-    """A repeated MCS (direct control of the motors) that the server refuses is followed by MSM.
+    """If the server refuses a repeated MCS (direct control of the motors), the driver sends MSM.
 
     The refusal shows that the first MCS has arrived. MSM ends the direct control.
     """
@@ -383,9 +383,10 @@ def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> 
 
 
 def test_mcs_is_tried_again_after_lost_replies_but_not_after_a_refusal() -> None:
-    """The network loses four replies to MCS, so the driver gives up. Then motors may run on again.
+    """The network loses four replies to MCS (switch off the motors), so the driver gives up.
 
-    The driver tries MCS once more. After "command not supported", it does not.
+    After a later move, motors may be on again, and the driver tries MCS once more. After the reply
+    "command not supported", it does not.
     """
     switch_off = SwitchOff()
     switch_off.doubt()

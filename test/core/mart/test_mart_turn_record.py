@@ -163,7 +163,7 @@ def test_a_server_without_records_is_asked_three_times(
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
     """When a few records have shown the ratio of the motors, the driver requests no more records.
 
-    The public server never closes a file that it has sent, so it gets no needless requests.
+    The public server never closes a file that it has sent, so the driver avoids needless requests.
     """
     bench = MartBench("source", motor_inequality=0.1).ready()
     for _ in range(2):
@@ -220,7 +220,8 @@ def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
 ) -> None:
     """The user gets the right file although the network has duplicated the driver's own LAST TURN.
 
-    The driver first waits until late replies to the copy can no longer arrive.
+    LAST TURN requests the record of a turn. Before the user's download, the driver waits until late
+    replies to the copy can no longer arrive.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))

@@ -56,7 +56,8 @@ def trembling(random: Random) -> list[float]:
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
     """Return ``count`` noisy readings of an IMU at rest, with 1 g upward, and with the given jumps.
 
-    ``leaps``: by number of the reading and number of the word, the value to add, in m/s² or rad/s.
+    ``leaps``: value to add to a reading, in m/s² or rad/s, by the index of the reading and the
+    index of the value in it.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
@@ -103,9 +104,10 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """A reading with the vertical force and the turn rates of another frame is rejected.
+    """If the vertical force and the turn rates jump in a single reading, the reading is rejected.
 
-    No robot changes its turn rate by this amount for a single reading.
+    Bytes of another frame in the reading can cause such jumps. No robot changes its turn rate by
+    this amount for a single reading.
     """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
@@ -200,7 +202,8 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
     """A single displacement jumps from 0.25 m/s to 1.5 m/s, and is rejected.
 
-    A pose follows. The filter holds it until the next displacement shows that the jump is over.
+    A pose follows. The filter holds the pose until the next displacement shows that the jump is
+    over.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)

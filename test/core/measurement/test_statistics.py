@@ -47,9 +47,10 @@ def test_a_pause_loses_nothing() -> None:
 def test_a_restart_after_a_pause_counts_only_if_lost_deltas_do_not_explain_it(
     restarts: bool,
 ) -> None:
-    """The board is paused and started again, or it restarts. The first delta after it is lost.
+    """The board restarts, or it is paused and started again. The first delta afterwards is lost.
 
-    The count of the next delta shows only the restart for sure. A restart shows a warning.
+    The driver counts a restart, which causes a warning, only in the first case. In the second case,
+    the lost delta explains the count of the next delta.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

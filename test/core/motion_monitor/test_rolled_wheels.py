@@ -99,7 +99,8 @@ def test_over_a_gap_the_angles_are_those_of_the_encoders(
 ) -> None:
     """After a gap of up to 0.4 s, the wheel angles agree with the encoders within 0.12 rad.
 
-    After 2 s in curves, the error is up to 5 rad: the driver assumes the shortest path.
+    After a gap of 2 s in curves, the error is up to 5 rad, because the driver assumes the shortest
+    path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

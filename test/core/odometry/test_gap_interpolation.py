@@ -93,7 +93,7 @@ def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
 def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
     """A pose does not change the last motion if a displacement came after the previous pose.
 
-    This displacement shows the present motion better.
+    The displacement shows the present motion better than the difference of the two poses.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
@@ -109,7 +109,7 @@ def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it
 ) -> None:
     """If poses show a robot at rest, a displacement that is lost later is not taken for a turn.
 
-    Before, the robot turned at 2 rad/s.
+    The robot turned at 2 rad/s until only poses arrived.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -204,9 +204,10 @@ def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> 
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(frame: str) -> None:
-    """The counter suggests a restart, but the next pose continues the old frame.
+    """A suspected restart that the next pose disproves leaves no uncertainty in the covariance.
 
-    So the robot did not come to rest unseen, and the pose shows all of its motion.
+    The counter suggests a restart, but the pose still refers to the board's old origin. So the
+    robot did not come to rest unseen, and the pose shows all of its motion.
     """
     deviations = []
     for suspected in (False, True):
@@ -230,9 +231,9 @@ def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(fram
 def test_a_loss_that_a_pose_shows_before_the_frame_is_known_is_bridged(
     frame: str, missing: int
 ) -> None:
-    """The odometry estimates the motion of a loss that only the first or second pose shows.
+    """The odometry estimates lost motion even if only the board's first or second pose shows it.
 
-    The board's frame is not known before the second pose.
+    The heading of the board's coordinate frame is not known before the second pose.
     """
     odometry, trip = Odometry(SETTINGS), Trip(0.3)
     estimates = []

@@ -89,8 +89,8 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     """After a gap of 2.1 s, both counters fit a restart as well as a loss of all deltas.
 
     Before the first pose, the board is paused, or the port is opened again. The pose is ambiguous
-    as before, because it is the first one after the gap. Otherwise, ``odom`` would move to the old
-    origin if the board has restarted.
+    nevertheless, because it is the first one after the gap. If the driver took it for certain,
+    ``odom`` would move to the old origin after a restart.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
@@ -108,9 +108,9 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
 ) -> None:
     """The board sends ``uptime`` deltas. In a gap of 12.4 s it restarts and sends 270 deltas.
 
-    By chance, the delta after the gap also continues the old counter. The counter of the next pose
-    begins at the same zero as that of the deltas, which has wrapped since then. After 217 deltas,
-    the pose shows the restart. After 1241, its counter continues the old one, too: it is ambiguous.
+    The counter of the deltas wraps in the gap, and by chance it continues the old count. The next
+    pose shows the restart after 217 deltas. After 1241 deltas, the counter of this pose also
+    continues its old count, so the pose is ambiguous.
     """
     sequence = counted(uptime)
     for count in range(270, 275):
@@ -122,11 +122,11 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
 
 @pytest.mark.parametrize("restarted", [True, False])
 def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(restarted: bool) -> None:
-    """Nothing arrives for 4 s. Then the next count arrives.
+    """After a silence of 4 s, the next count may be that of a board that has restarted.
 
-    The board may have restarted and counted up to it, so the driver supposes a restart. The counter
-    of the next pose shows it, too. Or the board stood still for 4 s, and its counters continue. So
-    the delta alone does not count as a restart.
+    The board may have counted up to this number again, so the driver supposes a restart. The
+    counter of the next pose decides. It shows the restart, or it continues, because the board only
+    stood still. So the delta alone does not count as a restart.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + 4.0
@@ -143,8 +143,10 @@ def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_b
 ) -> None:
     """A pose confirms a restart that a delta's count shows, if the pose's own counter is near 0.
 
-    * Pose counter that continues the old one: the count of the delta may be damaged.
-    * Pose counter that fits neither case: no restart is assumed.
+    In two other cases, the pose shows no restart:
+
+    * The pose counter continues its old count: the count of the delta may be damaged.
+    * The pose counter fits neither a restart nor its old count.
     """
     sequence = counted(200)
     after_s = 199 * 0.04 + 2.1
@@ -182,7 +184,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """A doubtful count 0 of a delta is a restart if the pose after it also has the count 0.
+    """A doubtful count 0 of a delta shows a restart if the next pose also has the count 0.
 
     No delta is then counted as lost.
     """

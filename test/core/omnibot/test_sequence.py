@@ -81,7 +81,8 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 ) -> None:
     """The board sends no poses, which could disprove a restart after a pause.
 
-    So the driver suspects a restart only if the count is not above the number of lost deltas.
+    So the driver suspects a restart only if the next count is at most the number of deltas that
+    would be lost without a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -107,10 +108,10 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 def test_a_restart_after_a_pause_is_doubtful_if_a_board_that_continued_lost_fewer_deltas(
     before: int, first: int, doubtful: bool
 ) -> None:
-    """The next count after a pause shows no restart.
+    """If counts are missing after a pause, the board has restarted, or it has continued.
 
-    If counts are missing, the board has restarted, or it has continued. The case in which fewer
-    deltas are lost is the more probable one.
+    The driver suspects a restart. The restart is doubtful if a board that continued would have lost
+    fewer deltas than a restarted one. The next count after the pause shows no restart.
     """
     sequence = begun(before - 10)
     for number in range(11):
@@ -164,7 +165,8 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
     """A supposed restart is withdrawn when the next delta continues the old count.
 
-    A false delta had a count near zero. The counter may have wrapped in between.
+    The restart was supposed because a false delta had a count near zero. The counter may have
+    wrapped since the last true delta.
     """
     sequence = begun(88)
     passed = 1 + 256 * wraps
