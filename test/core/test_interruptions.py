@@ -27,7 +27,10 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def restart_unheard(on: Line, boots_s: float, runs_s: float) -> None:
-    """Restart the board, and start it ``boots_s`` later. It then runs for ``runs_s`` unheard."""
+    """Restart the board, start it ``boots_s`` later, and let it run for ``runs_s``.
+
+    During all this, no frame from the board arrives.
+    """
     on.loses = lambda _data, _now: True
     on.board.receive(b"R")
     on.run(boots_s)
@@ -85,9 +88,10 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
-    """The board is paused and restarts unheard. The first count that is heard exceeds the old one.
+    """The board restarts in a pause, and the robot rests. Odom does not move to the new origin.
 
-    The robot stands still. Odom does not move to the board's new origin.
+    The board's frames are lost meanwhile. The first count that arrives exceeds the last count
+    before the restart.
     """
     on = line(0, frame=frame)
     on.drives = False
@@ -106,9 +110,10 @@ def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame:
 def test_a_restarted_board_that_first_moves_unheard_does_not_move_odom_to_its_origin(
     frame: str,
 ) -> None:
-    """If a restarted board drives for 0.4 s unheard, odom still continues from where it was.
+    """After a restart of the board in a drive, odom continues from its last pose.
 
-    The board's first poses are neither at its new origin nor at the old place.
+    No frames arrive until the robot has driven for 0.4 s after the restart. So the board's first
+    poses are neither at its new origin nor at the old place.
     """
     on = Line(BoardSettings(seed=1, frame=frame, running=True), seed=1)
     on.run(4.0)

@@ -76,9 +76,10 @@ def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
 
 
 def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
-    """If only poses arrive, the estimated motion takes their speed: 1 m/s, no longer 0.5 m/s.
+    """Poses show a speed of 1 m/s. Before them, the last displacement has shown 0.5 m/s.
 
-    Ten displacements are lost in this time.
+    Ten displacements are lost, and only poses arrive. Gap interpolation uses the speed of the
+    poses.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)

@@ -179,7 +179,7 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """A piece that spans the silence between two «Paused» texts costs neither of them.
+    """If a piece spans the silence between two «Paused» texts, both texts are still returned.
 
     The adapter delivers pieces of 8 bytes.
     """
