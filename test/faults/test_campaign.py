@@ -23,9 +23,7 @@ LEFT_OUT = {
 }
 """Cases that this module omits. ``make faults`` runs all cases.
 
-Tests in test_driver_commands, test_driver_services and test_driver_guard are similar to the last
-four of these cases. Each of the other omitted cases is similar to a case in this module or to a
-test in test/system.
+Each omitted case is similar to a case in this module or to a test in test/system.
 """
 CASES = {
     name: case for name, case in survivable(seed=0, damaged_s=1.0).items() if name not in LEFT_OUT

@@ -18,10 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""Longest time in s from the end of the commands until the robot must be at rest.
-
-It is longer than the command timeout, because a driver without data must first get measurements.
-"""
+"""Longest time in s from the end of the commands until the robot must be at rest, with a margin for
+a line that was damaged or cut until then."""
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:

@@ -98,7 +98,7 @@ def found() -> dict[str, list[str]]:
 
 @pytest.mark.parametrize("phrase", PATTERNS)
 def test_the_phrase_is_not_used(phrase: str) -> None:
-    """No text uses the phrase. CONTRIBUTING.md has examples of better sentences."""
+    """No text contains ``phrase``. CONTRIBUTING.md has examples of better sentences."""
     places = "\n".join(found().get(phrase, ()))
     assert not places, (
         f'please write this in other words; "Write plain English" in CONTRIBUTING.md has'

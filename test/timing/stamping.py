@@ -35,7 +35,7 @@ EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stal
 """For each event in the middle of a stream: the time in s in which the host does not read."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
-"""The generator of streams, cached. Callers share each stream, so they must not change it."""
+"""``generate`` with a cache. Callers may get the same stream, so they must not change it."""
 BOOT_S = 0.7123
 
 

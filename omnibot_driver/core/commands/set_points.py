@@ -148,8 +148,8 @@ class GoalSetpoint:
       discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
-    * ``before``: the command in effect. If it has the same goal, this one is its repetition: the
-      smallest distance so far stays known.
+    * ``before``: the previous command. If it has the same goal, the smallest distance to the goal
+      that the robot has reached stays known.
     """
 
     authority: Final = Authority.POSE

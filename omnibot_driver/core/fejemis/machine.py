@@ -160,7 +160,8 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The voltage may be lowered down to ``LEAST_PART * volts``, so that the checksum detects damage.
+    The checksum detects damage only in some texts of the voltage. So the line may have a lower
+    voltage, but at least ``LEAST_PART * volts``.
     """
     if not volts:
         return OFF[0], 0.0

@@ -21,9 +21,9 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 angle, in rad, at which a turn on the spot may begin, and may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad, that is permitted at full speed. At a
-larger deviation, the speed is lowered until the error of the body's velocity is as small as with
-this deviation at full speed.
+"""Angle in rad whose sine is the permitted error of the body's velocity, as a fraction of the speed
+at the front wheel. While the wheel turns to its target angle, the robot drives so slowly that the
+error is permitted.
 """
 
 

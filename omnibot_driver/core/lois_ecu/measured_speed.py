@@ -31,7 +31,7 @@ LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses while a
 wheel is faster than ``FAST_TICKS_PER_S``.
 
-While the board sends, it notices ticks late and misses some speeds.
+While the board sends, it notices ticks late, and computes no speed from some of them.
 """
 
 

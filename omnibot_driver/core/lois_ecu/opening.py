@@ -114,8 +114,8 @@ class SettingsWriter:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
         While the robot drives, only the first ``ROUNDS`` rounds may begin, because each written
-        gain resets the controller of a wheel. But the driver always completes a round: if the round
-        has written the terminal mode, a later line must restore the left short correction.
+        gain resets the controller of a wheel. A round that has begun is completed, because one line
+        may overwrite a setting that a later line restores.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 

@@ -172,12 +172,10 @@ class TickCounts:
         return self._odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start, if it restarted after the previous report.
+        """Return the time in s since the board's start, if it started after the previous report.
 
-        None in two cases:
-
-        * The unit of the clock is unknown.
-        * A clock in ns may have wrapped (every 4.3 s), or shows a start before the previous report.
+        None if the report does not show this: the unit of the board's clock is unknown, a clock in
+        ns may have wrapped (every 4.3 s), or it shows an earlier start.
 
         ``duration_s``: time in s since the previous report.
         """

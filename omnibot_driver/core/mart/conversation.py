@@ -206,8 +206,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply is recorded as missing, because it may come late. Only the reply to a controlled
-        move is not recorded, because the stop of the move waits for it.
+        The reply is recorded as missing, because it may come late. An exception is a controlled
+        move: its stop waits for the reply.
         """
         if self.pending is None:
             return None
@@ -273,8 +273,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        True if ``word`` is a query, its last reply was different, and an equal reply to another
-        query or to a move has just come.
+        ``word``: the command that is pending. Only a query can get such a copy: an equal reply to
+        another query or to a move has just come, and the last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

@@ -251,7 +251,7 @@ class _Spikes:
 
     The values are scaled so that a change of 1 between two readings is always plausible.
 
-    * ``left``: the limit for spikes: ``STILL`` or ``BACK``.
+    * ``left``: largest remaining change after a spike, as a fraction of the spike.
     * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
       can change implausibly much. Such a change may be a spike only if one flipped bit explains it.
     """

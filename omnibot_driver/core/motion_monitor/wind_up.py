@@ -57,12 +57,11 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m by which a held robot fell behind in the last displacement, if it was long.
+        """Distance in m that is added to the wind-up if the next displacement proves it.
 
-        A single long displacement does not prove that the robot is held. So the wind-up does not
-        include this distance until the robot is also held in the next displacement.
-
-        0: the wind-up includes the distance. None: the robot was not held in the last displacement.
+        After a long displacement in which the robot seemed to be held, this is the distance by
+        which it fell behind. The distance is proved if the robot is held in the next displacement
+        too. None: the robot was not held in the last displacement. 0: nothing is left to prove.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:

@@ -63,9 +63,9 @@ class GapInterpolation:
         return (before + tangent).times(half, half, half), tangent
 
     def before(self, told: Pose, waiting: PendingDisplacements) -> Pose:
-        """Return the pose from which the waiting displacements lead exactly to ``told``.
+        """Return the pose before the waiting displacements, if ``told`` is the pose after them.
 
-        Each displacement that was lost before or between them counts with its interpolated motion.
+        Displacements that were lost among the waiting ones are included by interpolation.
         """
         start, readings = waiting.before(told), waiting.readings
         if not any(reading.lost for reading in readings):

@@ -55,8 +55,8 @@ class InterFrameGaps:
     """The pauses within the bytes that the decoder holds, and what is known of this line's pauses.
 
     * ``byte_s``: time in s that the line takes for a byte.
-    * ``sharp``: whether the first byte after a pause normally begins a frame.
     * ``between``: whether the read after a pause normally contains the beginning of a frame.
+    * ``sharp``: whether this beginning normally is the first byte of the read.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
       further confirmations are not counted.
     * ``at_pace``: whether the line was busy for the whole time between the last two reads.

@@ -127,9 +127,10 @@ def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it
 
 
 def test_the_uncertainty_of_a_gap_does_not_depend_on_the_poses_in_it_if_they_are_not_used() -> None:
-    """Poses within a gap do not change its uncertainty if they only show the number of losses.
+    """Poses within a gap do not change its uncertainty if ``use_board_pose`` is False.
 
-    Fifty displacements are lost. ``use_board_pose`` is False, so no pose shows the lost motion.
+    Fifty displacements are lost. The counters of the poses show this number, but the driver does
+    not use the poses' motion.
     """
     deviations = []
     for poses in (0, 9):

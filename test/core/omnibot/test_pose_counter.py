@@ -184,9 +184,9 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """A doubtful count 0 of a delta shows a restart if the next pose also has the count 0.
+    """A delta with the count 0 may show a restart; the count 0 of the next pose confirms it.
 
-    No delta is then counted as lost.
+    The next delta then has the count 1, and the driver counts no delta as lost.
     """
     sequence = Sequence()
     for count in range(171):
