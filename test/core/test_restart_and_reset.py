@@ -79,8 +79,8 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
 ) -> None:
     """A pose exactly at the board's new origin shows a restart, so odom keeps its pose.
 
-    The counters of the board fit a restart as well as a loss of frames. If the pose lies 1 cm
-    beside the origin, or if the counters exclude a restart, the robot drove there.
+    The counters of the board can mean a restart or a loss of frames. Odom moves to the pose if the
+    pose lies 1 cm beside the origin, or if the counters exclude a restart.
     """
     odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):
@@ -113,7 +113,7 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_shor
 ) -> None:
     """A pose at the board's new origin also shows a restart in a short gap of 0.6 s.
 
-    The counters of the board fit a restart as well as a loss of frames. Odom adds only the assumed
+    The counters of the board can mean a restart or a loss of frames. Odom adds only the assumed
     motion in the gap. If the counters exclude a restart, the robot drove to the origin.
 
     Bug: odom moved to the board's old origin, if the robot could have driven there.

@@ -18,9 +18,9 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return ``grace_s``, ``ends_within_s`` and ``rest_s`` of ``Rig`` for a busy computer, in s.
+    """Return values of ``grace_s``, ``ends_within_s`` and ``rest_s`` (s) for a busy computer.
 
-    A commander that does not stop sends six commands in ``rest_s``, so the rig notices them. The
-    target ``make faults`` uses the defaults of ``Rig``.
+    ``make faults`` uses the smaller defaults of ``Rig``. During ``rest_s``, a node that continues
+    to command would send six commands, so the rig would notice it.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes of the terminal mode, and the stop of the robot before this and other changes.
+"""Changes of the terminal mode, and the stop before changes that need a robot at rest.
 
 In a terminal mode, the board reports neither motion nor its e-stop button. This module knows modes
 and times, but not how commands are sent.

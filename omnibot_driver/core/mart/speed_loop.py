@@ -67,15 +67,13 @@ HOLD_AFTER_S: Final = 1.0
 integrate the heading error."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Two factors that increase the uncertainty of the wheel speed ratio after an uncertain change of
-the motors' units, and a limit. A factor, times the squared relative change of the units, is added
-to the relative variance of the ratio.
+"""How uncertain the ratio of the wheel speeds becomes if the server may have missed a new set-point
+of the motors, or carried it out twice. ``COPIED`` or ``MISSED``, times the squared relative change
+of the set-point, is added to the relative variance of the ratio.
 
-``COPIED``: factor for a change that may arrive twice, because the network is slow.
-
-``MISSED``: factor for a change that the server did not answer.
-
-``SLOW_TRIP_S``: average duration of an exchange, in s, above which the network is slow.
+* ``COPIED``: for a set-point that may arrive twice, because the network is slow.
+* ``MISSED``: for a set-point that the server did not answer.
+* ``SLOW_TRIP_S``: average duration of an exchange, in s, above which the network is slow.
 """
 
 

@@ -82,10 +82,10 @@ class GapInterpolation:
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted.
 
-        If only poses arrive, use this pose to correct ``last``. Afterwards, ``last`` is the mean
-        motion per displacement since the previous accepted pose.
+        If all displacements since the previous accepted pose are lost, correct ``last``: it becomes
+        the mean motion per lost displacement.
 
-        ``way``: deviation of the pose from the assumed motion, as a tangent in body axes.
+        ``way``: motion to the pose minus the assumed motion, as a tangent in body axes.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last

@@ -52,7 +52,8 @@ If the IMU failed earlier, the driver's check before the start must find it.
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
-"""Commands that the server executes when the driver starts, one in each trial; empty for none."""
+"""The motions that may be in progress on the server when the driver starts, as commands. Each trial
+uses one of them; an empty command means no motion."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
 """Durations in s of the network's first interruption, which begins when the driver starts."""
 BACK_S: Final = (0.2, 0.7, 30.0)

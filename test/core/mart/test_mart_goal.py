@@ -30,7 +30,7 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """The odometry adds all of several equal moves, although many end with equal encoder counts."""
+    """The odometry adds every move, although equal moves may end with the same encoder count."""
     bench, goal = MartBench(firmware).ready(), Pose()
     for _ in range(4):
         goal = goal.moved(step)

@@ -42,7 +42,7 @@ def test_wheels_from_the_bodys_displacements_and_back(
 ) -> None:
     """``rolled`` is the sum of all displacements in the robot's axes, whatever axes the board uses.
 
-    The wheel angles that belong to ``rolled`` give the same turn of the body.
+    Converted to wheel angles and back, ``rolled`` still has the turn of the body.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
