@@ -51,9 +51,9 @@ class BoardKind:
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """An error in a trial, and the last writes before it.
+    """A wrong motion or letter at the board in a trial, and the driver's last writes before it.
 
-    ``writes``: the time, the bytes sent and the bytes received of each write.
+    ``writes``: for each write, its time in s, its bytes, and the bytes that reached the board.
     """
 
     scene: str

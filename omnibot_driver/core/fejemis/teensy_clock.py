@@ -62,8 +62,9 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """Number of implausible times in a row that agree. ``_odd``: the first of these times, and
-        its time of arrival.
+        """Number of successive board times that are implausible, but agree with each other.
+
+        ``_odd``: the first of these board times, and its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
         """Board times that seem early, by at most ``LATE_S``, each with its arrival time. All of

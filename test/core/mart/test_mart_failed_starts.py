@@ -89,9 +89,10 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """A push five seconds after a rejected RM (forward drive) does not show a defective server.
+    """Somebody pushes the robot five seconds after a rejected RM (forward drive).
 
-    A defective server would move the robot at once. The driver still allows motion.
+    The driver still allows motion. A server that wrongly obeys a rejected RM would have moved the
+    robot at once.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
