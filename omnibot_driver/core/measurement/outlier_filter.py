@@ -48,10 +48,10 @@ at the end of the scale. The largest positive reading of 16 bits is just above t
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
 changed implausibly much. The others are the poses after it."""
-ALIKE: Final = 2.0
-"""Largest ratio between the durations of two successive displacements. If the ratio is larger,
-the filter does not compare the two displacements. Otherwise, even a steady motion would look
-like a change."""
+ALIKE: Final = 1.1
+"""Largest ratio between the durations of two successive displacements. If the ratio is larger, e.g.
+because a line between them was lost, the filter does not compare the two displacements. Otherwise,
+even a steady motion would look like a change."""
 BACK: Final = 0.25
 """The same limit as ``STILL``, for displacements: after a spike, the next displacement differs from
 the displacement before the spike by at most this fraction of the spike's size."""

@@ -222,6 +222,19 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
     assert through.refused_displacements == 0
 
 
+@pytest.mark.parametrize("longer", [1.05, 1.5, 2.0, 3.0])
+def test_a_steady_motion_over_a_longer_time_is_delivered_at_once(longer: float) -> None:
+    """One displacement of a steady drive lasts longer, e.g. because a pose was lost before it.
+
+    Regression: with twice the duration, it was rejected as a spike, and ``odom`` lost 4 cm.
+    """
+    steady = DisplacementReading(0.02, 0.0, 0.04, "body", 0.02, 0)
+    both = longer * steady.dx_m, longer * steady.dyaw_rad
+    late = replace(steady, dx_m=both[0], dyaw_rad=both[1], duration_s=longer * 0.02)
+    given: list[Reading] = [*[steady] * 5, late, *[steady] * 5]
+    assert admitted(given, gate()) == [[reading] for reading in given]
+
+
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
     """When ten poses wait behind a displacement that has jumped, the filter releases everything."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
