@@ -46,6 +46,12 @@ Each of these poses must agree with the rejected pose just before it.
 MOVED_FRAME: Final = 2
 """Number that replaces ``NEW_FRAME`` if the wheel speeds explain the motion between the rejected
 poses."""
+AGAIN_M: Final = 0.004
+AGAIN_RAD: Final = 0.012
+"""``AGAIN_M``, ``AGAIN_RAD``: tolerances in m and rad for the question whether the origin has moved
+again between two rejected poses. If it has, the motion between them differs from the wheels'
+motion, and the way from the origin to the second is at most as long as the wheels' motion.
+"""
 LONGEST_JUMP_S: Final = 0.2
 """Longest time in s since the last accepted pose in which rejected poses that contradict each other
 may be due to an origin that moves again and again. Later, the poses are right, and the wheel speeds
@@ -180,7 +186,7 @@ class PoseOdometry:
             # The board computes poses and wheel speeds from the same encoders. So the poses have a
             # new origin, even if the robot could have driven to this place.
             off = way - rolled
-            moved_again = off.way_m > SLACK_M / 2 or abs(off.yaw_rad) > SLACK_RAD / 2
+            moved_again = not _within(off, Pose()) and _within(_place(pose), rolled)
             self._jump = self._jump.moved(roll(rolled if moved_again else way))
             if self._near(off, seconds):
                 return self._in_moved_frame(pose, self._jump, since_s)
@@ -269,6 +275,12 @@ def _half(one: Pose, other: Pose) -> Pose:
 
 def _place(pose: BoardPose) -> Pose:
     return Pose(pose.x_m, pose.y_m, pose.yaw_rad)
+
+
+def _within(way: Pose, rolled: Pose) -> bool:
+    return (
+        way.way_m <= rolled.way_m + AGAIN_M and abs(way.yaw_rad) <= abs(rolled.yaw_rad) + AGAIN_RAD
+    )
 
 
 def _possible(way: Pose, seconds: float) -> bool:

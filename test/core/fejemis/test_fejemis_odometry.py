@@ -221,6 +221,25 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
     assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.truth.x_m, abs=0.01)
 
 
+@pytest.mark.parametrize("v", [0.2, 0.35, 0.45])
+def test_a_pose_set_to_zero_before_three_poses_in_a_row_loses_no_motion(v: float) -> None:
+    """The board's pose is set to zero before each of three poses, 20 ms apart, in a steady drive.
+
+    Regression: the motion between two of them, up to 9 mm, was taken from the poses, which show
+    none.
+    """
+    drive = Drive()
+    drive.run(v, 0.0, 1.0)
+    before = drive.out
+    for _ in range(3):
+        drive.step(v, 0.0, heard=False)
+        drive.odometry.speeds(WheelSpeeds(v, v))
+        drive.board = Pose()
+        drive.say(told(drive.board, drive.now))
+    drive.run(v, 0.0, 0.4)
+    assert drive.out.x_m - before.x_m == pytest.approx(0.46 * v, abs=0.005)
+
+
 def test_a_pose_set_to_zero_three_times_at_once_does_not_move_the_odometry() -> None:
     """Another program sends ``enc0`` three times within 0.1 s, in a curve."""
     bench = nominal()
