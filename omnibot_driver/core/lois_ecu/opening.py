@@ -51,6 +51,9 @@ CONFIRMED_WITHIN: Final = 0.35
 fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
+LONGEST_SILENCE_S: Final = 1.0
+"""Longest time in s without ticks while rounds follow each other quickly. After a longer time, the
+driver would refuse motion, or regard the board as lost, and then begin the rounds again."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
@@ -263,6 +266,14 @@ class SettingsWriter:
             self._queue.append((at_s, command))
             at_s += LINE_S
         self._round_at_s = max(self._round_at_s, at_s)
+        # A written period begins anew on the board, so that no ticks may come during the rounds.
+        # If that would take too long, the next round waits for them. A command's place in a round
+        # moves from round to round.
+        ticks_s = min(self.settings.periods_ms.get(Stream.TICKS, 0) / 1000, LONGEST_SILENCE_S)
+        if ROUNDS * (self._round_at_s - now) + ticks_s > LONGEST_SILENCE_S:
+            moved_s = (at_s - now) / ROUNDS
+            ticks_at_s = now + (1 + CONFIRMED_WITHIN) * ticks_s + moved_s
+            self._round_at_s = max(self._round_at_s, ticks_at_s)
 
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round, in an order that changes from round to round.
