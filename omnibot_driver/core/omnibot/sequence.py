@@ -51,8 +51,9 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` may be wrong. This is so after a pause of the board, if a
-      loss of deltas without a restart would also explain the counter.
+    * ``doubtful``: whether ``restarted`` is True although the board has probably continued. This is
+      so after a pause of the board, if a board that continued lost fewer deltas than a restarted
+      one, and after a silence in which no delta is missing.
     """
 
     lost: int
@@ -107,9 +108,6 @@ class Sequence:
         The duration of the pause is unknown. So if the next delta does not continue the count, the
         board may have restarted, and its first deltas may be lost. Poses could disprove a restart.
         Without them, only a low count is regarded as a restart.
-
-        ``now``: time in s at which the board reported the pause. It limits the number of deltas
-        that can be lost: the board sent them after its last report of the pause.
         """
         self._paused, self._pose = True, None
 
