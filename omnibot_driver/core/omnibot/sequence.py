@@ -148,7 +148,7 @@ class Sequence:
             and (reconnected or from_zero)
         ):
             self._renewed, self._left = True, (before, before_at, count)
-            return Step(0, None, restarted=True, doubtful=not lost)
+            return Step(0, None, restarted=True, doubtful=lost % WRAP == 0)
         latest_s = (lost + 1) * period_s - (
             period_s / 2 if imus == self._imus_per_delta else latest_late_s
         )

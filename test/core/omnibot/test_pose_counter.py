@@ -120,16 +120,20 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
     assert sequence.ambiguous != restarted
 
 
+@pytest.mark.parametrize("silent_s", [4.0, 7.0])
 @pytest.mark.parametrize("restarted", [True, False])
-def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(restarted: bool) -> None:
-    """After a silence of 4 s, the next count may be that of a board that has restarted.
+def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
+    restarted: bool, silent_s: float
+) -> None:
+    """After a silence of 4 s or 7 s, the next count may be that of a board that has restarted.
 
     The board may have counted up to this number again, so the driver supposes a restart. The
     counter of the next pose decides. It shows the restart, or it continues, because the board only
-    stood still. So the delta alone does not count as a restart.
+    stood still. So the delta alone does not count as a restart. This is also true if the silence is
+    nearer to the 10.24 s of a wrap than to 0.
     """
     uptime = 331 if restarted else 30
-    sequence, first_s = counted(uptime), uptime * 0.04 + 4.0
+    sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
     steps = [sequence.delta((uptime + n) % 256, first_s + n * 0.04) for n in range(5)]
     assert [step.restarted for step in steps] == [True, False, False, False, False]
     assert steps[0].doubtful
