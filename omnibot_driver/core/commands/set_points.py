@@ -148,8 +148,9 @@ class GoalSetpoint:
       discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
-    * ``before``: the previous command. If it has the same goal, the smallest distance to the goal
-      that the robot has reached stays known.
+    * ``before``: the previous command. If it is a goal too, the smallest distance to it that the
+      robot has reached stays known, and grows by the distance between the two goals. So a
+      repetition of the goal changes nothing.
     """
 
     authority: Final = Authority.POSE
@@ -171,8 +172,10 @@ class GoalSetpoint:
         self._goal, self._check = goal, check
         self._order = self.final = GoTo(place)
         self._nearest_m = self._nearest_rad = math.inf
-        if isinstance(before, GoalSetpoint) and before._goal == goal:
-            self._nearest_m, self._nearest_rad = before._nearest_m, before._nearest_rad
+        if isinstance(before, GoalSetpoint):
+            apart = before._goal.way_to(goal)
+            self._nearest_m = before._nearest_m + apart.way_m
+            self._nearest_rad = before._nearest_rad + abs(apart.yaw_rad)
         self.check_anew()
 
     def order(self, now: float) -> Order:
