@@ -5,7 +5,7 @@
 If a line is missing or blocked, the others still work. Missing lines are opened again.
 
 There is one exception: if another program uses the first line, the others are given up too. So if
-two drivers wait for the same lines, one of them gets all lines.
+two drivers wait for the same lines in the same order, one of them gets all lines.
 """
 
 import select
