@@ -4,8 +4,9 @@
 
 If a line is missing or blocked, the others still work. Missing lines are opened again.
 
-There is one exception: if another program uses the first line, the others are given up too. So if
-two drivers wait for the same lines in the same order, one of them gets all lines.
+There is one exception: if another program uses the first line, and this line has not been open
+here, the others are given up too. So if two drivers wait for the same lines in the same order, one
+of them gets all lines.
 """
 
 import select
@@ -57,7 +58,7 @@ class Several:
         self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
         self._channels: dict[int, int] = {}
-        self._changed = False
+        self._changed = self._had_first = False
         try:
             self._wake_up = WakeUp()
         except OSError as error:
@@ -104,7 +105,7 @@ class Several:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
         Raises LinesChanged if a line was lost or reopened, LinkError if all lines are missing, or
-        if another program uses the first line.
+        if another program uses the first line, which has not been open here.
         """
         if not self._ready:
             if not self._changed:  # the guard process may still have a copy of a line just lost
@@ -197,7 +198,7 @@ class Several:
                 port = line.opener()
             except LinkError as error:
                 line.trouble = str(error)
-                if channel == 0 and isinstance(error, PortInUse):
+                if channel == 0 and isinstance(error, PortInUse) and not self._had_first:
                     raise
                 continue
             if port.descriptors is None or len(port.descriptors) != 1:
@@ -207,6 +208,7 @@ class Several:
                 line.begin(port)
                 assert line.descriptor is not None
                 self._channels[line.descriptor] = channel
+                self._had_first |= channel == 0
                 self._arrivals.register(line.descriptor, select.POLLIN)
             self._changed = True
 

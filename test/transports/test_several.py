@@ -268,6 +268,24 @@ def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
                 Several(openers)
 
 
+def test_a_program_that_takes_the_lost_first_line_does_not_cost_the_second(
+    ends: Ends, lines: Several
+) -> None:
+    """The first line is lost during a drive, and another program opens it when it comes back.
+
+    The second line stays open, because the robot may have to be stopped through it.
+    """
+    ends.hang_up(0)
+    assert list(changed(lines)) == [0]
+    ends.far[0], ends.near[0] = os.openpty()
+    Path(ends.paths[0]).symlink_to(os.ttyname(ends.near[0]))
+    with contextlib.closing(SerialPort(ends.paths[0], 115200)):
+        while "in use" not in lines.missing[0]:
+            lines.read()
+        assert list(lines.missing) == [0]
+    assert changed(lines) == {}
+
+
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
     """A port without a file descriptor cannot be one of several lines: LinkError is raised."""
     with pytest.raises(LinkError, match="does not work for a board with several ports"):
