@@ -183,6 +183,7 @@ class Ground:
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
         self.heard_s = self.appeared_s = self._gap_s = -math.inf
+        self._silence_s = 0.0  # time between the last two replies
         self.greeted = False
         self.began_s: float | None = None
         self._next_s = -math.inf
@@ -247,7 +248,9 @@ class Ground:
         told = self.odometry.heading.told_s >= self._gap_s  # a heading has come since the last gap
         if self.state is State.STILL and told and self._is_quiet(now):
             self._gap_s = now
+            self.odometry.heading.may_begin_anew = True
             self._polls.press(words.RMRA)
+        self._silence_s = now - self.heard_s
         self.heard_s = now
 
     def _is_quiet(self, now: float) -> bool:

@@ -176,8 +176,13 @@ class Reckoning(CorrectedPose):
         turn_rad = min(
             most_rad, abs(self.heading.rate_radps) * unread_s + _turn_error_rad(unread_s)
         )
-        way_m = (abs(self.speeds.means[0]) + UNREAD_MPS) * unread_s * min(1.0, turn_rad)
+        way_m = self._fastest_mps * unread_s * min(1.0, turn_rad)
         self.doubt.add(way_m**2, turn_rad**2)
+
+    @property
+    def _fastest_mps(self) -> float:
+        """Return the measured speed plus its standard deviation, in m/s."""
+        return abs(self.speeds.means[0]) + UNREAD_MPS
 
     def turned(self, degrees: float, when: Moment) -> bool:
         """Process a reported heading in degrees; return whether it is plausible and has changed."""
@@ -185,8 +190,10 @@ class Reckoning(CorrectedPose):
             return False
         known = self.heading.is_known
         angle_rad = math.radians(degrees) * self._settings.heading_sign
-        if self.heading.begins_anew(angle_rad) and self.motion is not Motion.NONE:
-            self.doubt.add(0.0, ANY_RAD**2)
+        turn_rad = min(ANY_RAD, self.heading.doubt_rad(angle_rad, when.at_s))
+        if turn_rad and self.motion is not Motion.NONE:
+            way_m = self._fastest_mps * (when.at_s - self.heading.told_s) * min(1.0, turn_rad)
+            self.doubt.add(way_m**2, turn_rad**2)
         changed = self.heading.tell(angle_rad, when, self._stood_s)
         if not known and self.heading.is_known and self.motion is Motion.REFERENCE:
             self.doubt.add(0.0, (BEGIN_RADPS * (when.at_s - self._began_s)) ** 2)
