@@ -34,9 +34,15 @@ GOALS = 4
 EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
 
 
-def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
-    """Return a bench that is ready to drive. Its network has the faults ``network``."""
+def on(
+    network: NetworkFaults, firmware: Firmware, seed: int = 0, after_s: float = 0.0
+) -> MartBench:
+    """Return a bench that is ready to drive. Its network has the faults ``network``.
+
+    ``after_s``: how long the network is good while the bench is ready, in s.
+    """
     bench = MartBench(firmware, seed=seed).ready()
+    bench.run(after_s)
     for channel in bench.robot.network:
         channel.to_board._faults = channel.from_board._faults = network
     return bench
@@ -115,7 +121,9 @@ def main() -> None:
         reached = discarded = 0
         worst_m = 0.0
         for seed in range(count):
-            bench, random = on(faults, EVERY_FIRMWARE[seed % 3], seed), Random(seed)
+            random = Random(seed)
+            # else, the first goal would always come at the same phase of the queries
+            bench = on(faults, EVERY_FIRMWARE[seed % 3], seed, random.uniform(0.0, 2.0))
             for _ in range(GOALS):
                 goal = random_goal(random)
                 reach(bench, goal)
