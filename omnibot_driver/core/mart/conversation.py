@@ -110,7 +110,8 @@ class Conversation:
       foreign, or they answer a repeated stop.
     * ``trip_s``: average duration of a query, in s; each unanswered query increases it.
     * ``answered_trip_s``: average duration of answered queries, in s.
-    * ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply.
+    * ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply, or at
+      which a stop ended that took three commands.
     """
 
     def __init__(self, delay_s: float) -> None:

@@ -82,6 +82,8 @@ class Stopping:
 
     ``planned``: whether the motion is stopped without a fault, only because another motion or a
     standstill is wanted.
+
+    ``rounds``: number of stop commands sent to the command port.
     """
 
     def __init__(
@@ -112,7 +114,7 @@ class Stopping:
         self._unsure_until_s = -math.inf
         self._owed = owed
         self._doubtful: list[tuple[Ok, bool]] = []
-        self._rounds = 0
+        self.rounds = 0
         self._negative: set[str] = set()
         longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
         self._patience_s = (3.0 if move is not None else longest_s) + 2 * delay_s
@@ -122,7 +124,7 @@ class Stopping:
         """Return the commands to send now."""
         if now < self.wake_at:
             return ()
-        silent = self._rounds >= ROUNDS and now >= self._silent_from_s
+        silent = self.rounds >= ROUNDS and now >= self._silent_from_s
         # SL or SS would run at the same time as an SM or SRM just sent, and could hang a port
         if silent and now <= self._said_s + self._delay_s:
             self.wake_at = self._said_s + self._delay_s + 0.01
@@ -131,7 +133,7 @@ class Stopping:
         if silent:
             self.last_port += 1
             return LAST_HALTS[self.motion]
-        self._rounds += 1
+        self.rounds += 1
         self._said_s = now
         if now < self._sure_from_s:  # the start may still come, after this stop
             self._unsure_until_s = now + 2 * self._delay_s
@@ -163,7 +165,7 @@ class Stopping:
         if now >= self._own_from_s:  # from this time on, a reply answers the start or a stop
             if not none and not _is_number(reply):
                 self.began = True
-            elif none and self._rounds == 1:
+            elif none and self.rounds == 1:
                 self.began = self.began or False
         if isinstance(reply, Ok) and self._owed > 0 and reply.form is Form.NOTHING:
             self.doubt(reply)

@@ -216,6 +216,8 @@ class Stops(Ground, ABC):
         self._moved_by = None  # the move was cut short
         self.conversation.settle(now)
         assert stopping is not None
+        if stopping.motion is not Motion.UNKNOWN and stopping.rounds >= ROUNDS:
+            self.conversation.missed_s = now  # maybe a restart left a stop command unanswered
         if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
             self.conversation.owes(Form.INTEGER, now)
         result, motion = stopping.result, stopping.motion

@@ -300,6 +300,26 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
     assert error.way_m < 2.0 * math.sqrt(max(noise.xx, noise.yy))
 
 
+@pytest.mark.parametrize("boot_s", [0.03, 0.3, 0.5])
+@pytest.mark.parametrize("after_s", [0.3, 0.4])
+def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_queries(
+    after_s: float, boot_s: float
+) -> None:
+    """The server restarts in the stop of its first turn, after its reply to a first SM.
+
+    VOLTS would crash the server that starts up. It waits, because the stop took three commands.
+    """
+    bench = MartBench("source").ready()
+    bench.command_until(0.0, 0.5, lambda: not bench.robot.stands, 8.0)
+    bench.command(0.0, 0.5, 1.5)
+    since = len(bench.written)
+    bench.command_until(0.0, 0.0, lambda: b"SM" in bench.said(since))
+    bench.run(after_s)
+    bench.server.restart(boot_s)
+    bench.run(boot_s + 3.0)
+    assert not bench.server.crashed
+
+
 def covers_the_turn(bench: MartBench) -> bool:
     """Return whether the covariance covers the error of the heading."""
     return abs(bench.error.yaw_rad) < 2.0 * math.sqrt(bench.odometry[-1].covariance.yaw_yaw)
