@@ -44,7 +44,7 @@ TRAITS: Final = Traits(
     advice={
         Fault.WRONG_WAY: "check `encoder_inverted`, and the wiring of motors and encoder",
         Fault.WRONG_TURN: "check `heading_inverted`, and the wiring of the motors",
-        Fault.TOO_FAST: "check `metres_per_count`",
+        Fault.TOO_FAST: "check `metres_per_count` and `heading_inverted`",
         Fault.TURNS_TOO_FAST: "check `track`, `metres_per_count` and `spin_speed`",
         Fault.BEYOND_LIMITS: "check `metres_per_count` and `track`",
     },

@@ -144,7 +144,7 @@ class Stops(Ground, ABC):
         if self._heading_is_told and frozen:
             if self.motion is not Motion.SPIN and abs(odometry.speeds.means[0]) < CREEP_MPS:
                 return STUCK
-            return "the relative heading does not change: the IMU is dead"
+            return "the relative heading does not change: the IMU is dead, or the robot cannot turn"
         return ""
 
     @property
