@@ -86,7 +86,7 @@ class PoseOdometry:
         self._agreed = 0
         """How often in a row a rejected pose has agreed with the pose before it, which was
         rejected, too."""
-        self._jump: Pose | None = None
+        self._driven: Pose | None = None
         """Motion from the last accepted pose to the last rejected one.
 
         It is computed from wheel speeds. From one rejected pose to the next, these two poses give
@@ -154,7 +154,7 @@ class PoseOdometry:
         way = log_of(self._told.way_to(_place(pose)))
         if seconds < LEAST_S or not self._explained(way, seconds):
             return self._doubt(pose, seconds)
-        self._doubted, self._agreed, self._jump = None, 0, None
+        self._doubted, self._agreed, self._driven = None, 0, None
         displacement = self._drawn(way, seconds, pose.decimals)
         self._pose = pose
         self._told = self._told.moved(roll(displacement))
@@ -162,7 +162,7 @@ class PoseOdometry:
 
     def _begin_at(self, pose: BoardPose) -> None:
         self._pose, self._told = pose, _place(pose)
-        self._doubted, self._agreed, self._jump = None, 0, None
+        self._doubted, self._agreed, self._driven = None, 0, None
 
     def _doubt(self, pose: BoardPose, since_s: float) -> DisplacementReading | None:
         before, self._doubted = self._doubted, pose
@@ -170,30 +170,30 @@ class PoseOdometry:
         if self._pose is None:
             return None
         if before is None:
-            self._jump = self._jump_at(pose, since_s)
+            self._driven = self._driven_to(pose, since_s)
             return None
         seconds = pose.time_s - before.time_s
         way = log_of(_place(before).way_to(_place(pose)))
         if seconds < LEAST_S or not _possible(way, seconds):
-            self._agreed, self._jump = 0, self._jump_at(pose, since_s)
+            self._agreed, self._driven = 0, self._driven_to(pose, since_s)
             return None
         # Two rejected poses agree. If the robot can have reached the second, it is accepted.
         # Otherwise, the board may have begun a new coordinate frame (command ``enc0``).
         whole = log_of(self._told.way_to(_place(pose)))
         self._agreed += 1
         rolled = self._rolled(seconds)
-        if self._jump is not None and rolled is not None:
+        if self._driven is not None and rolled is not None:
             # The board computes poses and wheel speeds from the same encoders. So the poses have a
             # new origin, even if the robot could have driven to this place.
             off = way - rolled
             moved_again = not _within(off, Pose()) and _within(_place(pose), rolled)
-            self._jump = self._jump.moved(roll(rolled if moved_again else way))
+            self._driven = self._driven.moved(roll(rolled if moved_again else way))
             if self._near(off, seconds):
-                return self._in_moved_frame(pose, self._jump, since_s)
+                return self._in_moved_frame(pose, self._driven, since_s)
             if since_s <= LONGEST_JUMP_S:  # the origin may have moved again
                 self._agreed = 0
                 return None
-        self._jump = None
+        self._driven = None
         if since_s > 0.0 and _possible(whole, since_s):
             self._begin_at(pose)
             return _reading(whole, since_s)
@@ -204,7 +204,7 @@ class PoseOdometry:
             way.x_m, way.y_m, way.yaw_rad, "body", seconds, 0, restarted=True
         )
 
-    def _jump_at(self, pose: BoardPose, since_s: float) -> Pose | None:
+    def _driven_to(self, pose: BoardPose, since_s: float) -> Pose | None:
         """Return the motion from the last accepted pose to this rejected one, by the wheel speeds.
 
         None if the speeds are unknown, or if rounding may be the reason for the rejection: the
@@ -219,13 +219,13 @@ class PoseOdometry:
         return None if rolled is None else roll(rolled)
 
     def _in_moved_frame(
-        self, pose: BoardPose, jump: Pose, since_s: float
+        self, pose: BoardPose, driven: Pose, since_s: float
     ) -> DisplacementReading | None:
         if self._agreed < MOVED_FRAME:
             return None
         self._begin_at(pose)
         self._moved = True
-        return _reading(log_of(jump), since_s)
+        return _reading(log_of(driven), since_s)
 
     def _rolled(self, seconds: float) -> Pose | None:
         """Return the motion in ``seconds``, computed from the mean of each wheel's last two speeds.
