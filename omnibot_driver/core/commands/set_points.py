@@ -165,7 +165,7 @@ class GoalSetpoint:
         check: Callable[[Order], object],
         *,
         direct: bool = True,
-        before: "Setpoint | None" = None,
+        before: Setpoint | None = None,
     ) -> None:
         self.alignment = alignment
         self._direct = direct
