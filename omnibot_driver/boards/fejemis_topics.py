@@ -275,7 +275,7 @@ class FejemisTopics:
         """Call ``action``; return the reason for a refusal, or an empty string.
 
         ``off``: whether ``action`` switches a device off. It is then called in any state of the
-        boards, but a closed port gives a warning.
+        boards, except in a replay, but a closed port gives a warning.
         """
 
         def say(session: Session, now: float) -> str:

@@ -266,9 +266,9 @@ class SettingsWriter:
             self._queue.append((at_s, command))
             at_s += LINE_S
         self._round_at_s = max(self._round_at_s, at_s)
-        # A written period begins anew on the board, so that no ticks may come during the rounds.
-        # If that would take too long, the next round waits for them. A command's place in a round
-        # moves from round to round.
+        # When a period is written, it begins anew on the board. So maybe no ticks come during the
+        # rounds. If this would last too long, the next round waits for ticks. The place of a
+        # command moves from round to round.
         ticks_s = min(self.settings.periods_ms.get(Stream.TICKS, 0) / 1000, LONGEST_SILENCE_S)
         if ROUNDS * (self._round_at_s - now) + ticks_s > LONGEST_SILENCE_S:
             moved_s = (at_s - now) / ROUNDS

@@ -181,7 +181,7 @@ class Reckoning(CorrectedPose):
 
     @property
     def _fastest_mps(self) -> float:
-        """Return the measured speed plus its standard deviation, in m/s."""
+        """The measured speed plus its standard deviation, in m/s."""
         return abs(self.speeds.means[0]) + UNREAD_MPS
 
     def turned(self, degrees: float, when: Moment) -> bool:

@@ -146,7 +146,8 @@ class RelativeHeading:
     def begins_anew(self, angle_rad: float, at_s: float) -> bool:
         """Return whether a heading shows a restart of the server, and not a turn.
 
-        After a restart, the heading is zero, or the turn since then. On some servers, it runs on.
+        After a restart, the heading is zero. On some servers, it then shows the turn since the
+        restart.
         """
         before_rad = self._angle_rad
         if not self.may_begin_anew or before_rad is None or abs(before_rad) <= OLD_RAD:

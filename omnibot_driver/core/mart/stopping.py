@@ -83,7 +83,7 @@ class Stopping:
     ``planned``: whether the motion is stopped without a fault, only because another motion or a
     standstill is wanted.
 
-    ``rounds``: number of stop commands sent to the command port.
+    ``rounds``: how often the stop was sent to the command port.
     """
 
     def __init__(

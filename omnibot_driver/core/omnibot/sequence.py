@@ -53,7 +53,7 @@ class Step:
       it.
     * ``doubtful``: whether ``restarted`` is True although the board has probably continued. This is
       so after a pause of the board, if a board that continued lost fewer deltas than a restarted
-      one, and after a silence in which no delta is missing.
+      one, and after a silence, if the delta has the next count.
     """
 
     lost: int
