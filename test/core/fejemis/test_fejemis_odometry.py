@@ -9,59 +9,16 @@ import statistics
 from collections.abc import Callable
 
 import pytest
-from fejemis_bench import DRIVE, WHEELS, Bench, nominal
+from fejemis_bench import WHEELS, Bench, nominal
+from fejemis_drive import PERIOD_S, TRACK_M, Drive, told
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
-from omnibot_driver.core.fejemis.odometry import PoseOdometry
-from omnibot_driver.core.fejemis.sums import with_sum
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimate import OdometrySettings
 from omnibot_driver.core.odometry.estimator import Odometry
-from omnibot_driver.core.readings import DisplacementReading
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
-
-PERIOD_S = 0.02
-TRACK_M = 0.4
-
-
-def told(place: Pose, time_s: float) -> BoardPose:
-    """Return the message with the drive board's pose, rounded as the board prints it."""
-    return BoardPose(
-        round(time_s, 5), round(place.x_m, 3), round(place.y_m, 3), round(place.yaw_rad, 4), 3
-    )
-
-
-class Drive:
-    """A simulated drive board whose pose and speed messages go to the odometry every 20 ms."""
-
-    def __init__(self, *, with_speeds: bool = True) -> None:
-        self.odometry = PoseOdometry(TRACK_M)
-        self.board, self.out, self.now = Pose(), Pose(), 10.0
-        self.readings: list[DisplacementReading] = []
-        self.with_speeds = with_speeds
-
-    def say(self, pose: BoardPose) -> DisplacementReading | None:
-        reading = self.odometry.pose(pose)
-        if reading is not None:
-            self.readings.append(reading)
-            self.out = self.out.moved(roll(Pose(reading.dx_m, reading.dy_m, reading.dyaw_rad)))
-        return reading
-
-    def step(self, v: float, w: float, *, heard: bool = True) -> None:
-        self.now += PERIOD_S
-        self.board = self.board.moved(roll(Pose(v * PERIOD_S, 0.0, w * PERIOD_S)))
-        if not heard:
-            return
-        if self.with_speeds:
-            half = w * TRACK_M / 2
-            self.odometry.speeds(WheelSpeeds(round(v - half, 3), round(v + half, 3)))
-        self.say(told(self.board, self.now))
-
-    def run(self, v: float, w: float, seconds: float, *, heard: bool = True) -> None:
-        for _ in range(round(seconds / PERIOD_S)):
-            self.step(v, w, heard=heard)
 
 
 def test_displacements_add_up_to_the_pose() -> None:
@@ -149,140 +106,6 @@ def test_two_different_false_poses_in_a_row_move_nothing() -> None:
         )
     drive.run(0.3, 0.4, 1.0)
     assert drive.out.way_to(drive.board).way_m < 0.003
-
-
-def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """The odometry does not jump when another program sets the board's pose to zero (``enc0``)."""
-    drive = Drive()
-    drive.run(0.5, 0.2, 4.0)
-    before = drive.out
-    drive.board = Pose()
-    drive.run(0.0, 0.0, 0.2)
-    assert before.way_to(drive.out).way_m < 0.02
-    drive.run(0.3, 0.0, 1.0)
-    assert before.way_to(drive.out).way_m == pytest.approx(0.3, abs=0.03)
-
-
-@pytest.mark.parametrize("seconds", [0.3, 0.8, 1.5, 4.0])
-@pytest.mark.parametrize(("v", "w"), [(0.3, 0.2), (0.3, 0.0), (0.0, 0.8)])
-def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
-    seconds: float, v: float, w: float
-) -> None:
-    """If another program sends ``enc0`` during a drive, ``odom`` does not jump.
-
-    Regression: if the robot was near the old origin, ``odom`` went back to this origin.
-    """
-    bench = nominal()
-    bench.drive_on(v, w, 2.0)
-    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-    bench.drive_on(v, w, seconds)
-    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-    bench.drive_on(v, w, 1.0)
-    bench.run(1.5)
-    last, truth = bench.odometry[-1], bench.robot.truth
-    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
-    assert off.way_m < 0.02
-    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
-
-
-def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
-    """The board's pose is set to zero during braking, and the next wheel speeds are lost.
-
-    The poses after it show the motion, so only the way to the first of them has an error.
-    """
-    drive = Drive()
-    drive.run(0.0, 0.0, 0.1)
-    drive.run(0.9, 0.0, 1.0)
-    before, drive.board = drive.out, Pose()
-    for v in (0.8, 0.7, 0.6):
-        drive.step(v, 0.0, heard=False)
-        drive.say(told(drive.board, drive.now))
-    drive.run(0.6, 0.0, 0.1)
-    assert drive.out.x_m - before.x_m == pytest.approx(drive.board.x_m, abs=0.004)
-
-
-@pytest.mark.parametrize("wait_s", [0.01, 0.03, 0.04, 0.05])
-@pytest.mark.parametrize("v", [0.5, 0.9])
-def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
-    v: float, wait_s: float
-) -> None:
-    """If another program sends ``enc0`` twice within three poses of a drive, ``odom`` stays right.
-
-    Regression: the second ``enc0`` seemed to contradict the first, and ``odom`` went back by the
-    whole distance driven.
-    """
-    bench = nominal()
-    bench.drive_on(v, 0.0, 0.8)
-    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-    bench.run(wait_s)
-    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-    bench.drive_on(v, 0.0, 0.5)
-    bench.run(1.5)
-    assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.truth.x_m, abs=0.01)
-
-
-@pytest.mark.parametrize("v", [0.2, 0.35, 0.45])
-def test_a_pose_set_to_zero_before_three_poses_in_a_row_loses_no_motion(v: float) -> None:
-    """The board's pose is set to zero before each of three poses, 20 ms apart, in a steady drive.
-
-    Regression: the motion between two of them, up to 9 mm, was taken from the poses, which show
-    none.
-    """
-    drive = Drive()
-    drive.run(v, 0.0, 1.0)
-    before = drive.out
-    for _ in range(3):
-        drive.step(v, 0.0, heard=False)
-        drive.odometry.speeds(WheelSpeeds(v, v))
-        drive.board = Pose()
-        drive.say(told(drive.board, drive.now))
-    drive.run(v, 0.0, 0.4)
-    assert drive.out.x_m - before.x_m == pytest.approx(0.46 * v, abs=0.005)
-
-
-def test_a_pose_set_to_zero_three_times_at_once_does_not_move_the_odometry() -> None:
-    """Another program sends ``enc0`` three times within 0.1 s, in a curve."""
-    bench = nominal()
-    bench.drive_on(0.9, -1.0, 0.8)
-    for _ in range(3):
-        bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-        bench.run(0.04)
-    bench.drive_on(0.9, -1.0, 0.5)
-    bench.run(1.5)
-    last, truth = bench.odometry[-1].pose, bench.robot.truth
-    assert Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last).way_m < 0.03
-
-
-@pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
-def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
-    """With reads every 0.15 s, ``odom`` does not jump if another program sends ``enc0``.
-
-    Regression: the first pose of a read had no wheel speeds, because the age of wheel speeds was
-    counted from their arrival.
-    """
-    bench = nominal()
-    bench.drive_on(0.5, 0.3, 0.6)
-    bench.read_s = 0.15
-    bench.run(wait_s)
-    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-    bench.run(1.5)
-    last, truth = bench.odometry[-1], bench.robot.truth
-    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
-    assert off.way_m < 0.02
-    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
-
-
-def test_a_pose_set_to_zero_at_rest_does_not_move_the_odometry() -> None:
-    """If another program sends ``enc0`` while the robot stands, ``odom`` stays where it is."""
-    bench = nominal()
-    bench.drive_on(0.3, 0.2, 1.0)
-    bench.run(1.5)
-    before = bench.odometry[-1].pose
-    bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
-    bench.run(1.5)
-    off = before.way_to(bench.odometry[-1].pose)
-    assert off.way_m < 0.005
-    assert abs(off.yaw_rad) < 0.005
 
 
 def test_a_pose_with_coarse_digits_is_no_new_frame() -> None:
