@@ -268,8 +268,7 @@ class CommandPipeline:
         ]
 
     def end_goal(self, now: float) -> list[str]:
-        """Drop the goal or the docking after a refused zero ``cmd_vel``; return notices for the
-        user.
+        """Drop the goal or the docking after a refused zero ``cmd_vel``; return notices.
 
         The goal stays if the board's control switch does not permit velocities.
         """

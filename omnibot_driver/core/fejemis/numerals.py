@@ -41,8 +41,7 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """Return the safe number (``numerals``) that is nearest to a positive ``number``, with its
-    text.
+    """Return the safe number (``numerals``) nearest to a positive ``number``, with its text.
 
     ``down``: whether the result must not exceed ``number``. If all safe numbers exceed ``number``,
     the result is the smallest of them.
@@ -55,9 +54,7 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 
 
 def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the safe numbers (``numerals``) just below and just above ``number``, with their
-    texts.
-    """
+    """Return the safe numbers (``numerals``) next to ``number``, below and above, with texts."""
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
     part = slice(max(0, at - 1), at + 1)

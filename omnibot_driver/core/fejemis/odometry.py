@@ -137,8 +137,9 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad, restarted=moved)]
 
     def pose(self, pose: BoardPose) -> DisplacementReading | None:
-        """Return the displacement from the previous pose; None if ``pose`` is rejected or the
-        first.
+        """Return the displacement from the previous pose; None if there is none.
+
+        There is none if ``pose`` is the first one, or is rejected.
 
         After a restart of the board, the first displacement is 0.
         """

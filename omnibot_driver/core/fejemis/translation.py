@@ -147,8 +147,7 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add the waiting IMU samples and orientations to the readings, up to the first doubtful
-        sample.
+        """Add waiting IMU samples and orientations to the readings, up to the first doubtful one.
 
         Call this method after a pose and at the end of a read.
         """

@@ -171,8 +171,7 @@ class LoisConversation:
 
     @property
     def held_until(self) -> float:
-        """Time at which the caller must call ``receive`` with b"" to get the reports that are held
-        back.
+        """Time at which the caller must call ``receive`` with b"" to get the reports held back.
 
         Infinity if there are none.
         """
@@ -291,8 +290,9 @@ class LoisConversation:
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Return the lines that command the rates of both wheels, in rad/s; Stop if both round to
-        zero.
+        """Return the lines that command the rates of both wheels, in rad/s.
+
+        The result is Stop if both rates round to zero.
 
         Raises CommandRefused for a motion in a terminal mode or during a change of mode.
         """

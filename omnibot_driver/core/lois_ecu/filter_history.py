@@ -32,8 +32,7 @@ class FilterHistory:
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """Restore the last state that was stored at ``then_s`` or earlier, or else the oldest
-        state.
+        """Restore the last state stored at ``then_s`` or earlier, or else the oldest state.
 
         Return the time in s of this state; None if no state is stored.
         """
