@@ -28,7 +28,7 @@ class Services:
     def _add(self, kind: Any, name: str, callback: Callable[..., Any], **_options: object) -> None:
         self._services[name] = kind, callback
 
-    def answers(self, *, data: bool = True, but: str = " ") -> dict[str, tuple[bool, str]]:
+    def answers(self, *, data: bool = True, but: str | None = None) -> dict[str, tuple[bool, str]]:
         """Call each service, and return ``success`` and ``message`` of each.
 
         Fails if a service does not answer at once. ``data``: the value for each SetBool. ``but``:
@@ -36,7 +36,7 @@ class Services:
         """
         answers = {}
         for name, (kind, callback) in self._services.items():
-            if but in name:
+            if but is not None and but in name:
                 continue
             request, response = kind.Request(), kind.Response()
             if hasattr(request, "data"):

@@ -1,7 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot's own parameters, in addition to those of every board. This module does not use
-ROS."""
+"""The OmniBot's own parameters, in addition to those of every board.
+
+This module does not use ROS.
+"""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -23,8 +23,10 @@ all lines are closed."""
 
 
 class LinesChanged(Exception):
-    """One of several lines was lost or opened again. ``Transport.missing`` shows which are
-    missing."""
+    """One of several lines was lost or opened again.
+
+    ``Transport.missing`` shows which lines are missing.
+    """
 
 
 class Transport(Protocol):
@@ -69,8 +71,7 @@ class Transport(Protocol):
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write only the bytes that are accepted without waiting; return the number of these
-        bytes."""
+        """Write only the bytes that are accepted without waiting; return their number."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, if this kind of port allows it."""

@@ -106,8 +106,7 @@ class UdpPorts:
             raise failed
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write the datagrams that are accepted without waiting; return the number of their
-        bytes."""
+        """Write the datagrams that are accepted without waiting; return how many bytes."""
         taken = 0
         for channel, data in packets:
             with contextlib.suppress(OSError):

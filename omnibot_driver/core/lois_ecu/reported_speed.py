@@ -225,8 +225,7 @@ class ReportedSpeed:
             self._doubted_m = wrong_m
 
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel's estimate by the mean speed that the wheel had between its last two
-        ticks."""
+        """Correct the wheel's estimate by its mean speed between the last two ticks."""
         motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
         push = estimate.mean[base + PUSH]
         lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)

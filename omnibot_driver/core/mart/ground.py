@@ -287,8 +287,7 @@ class Ground:
 
     @property
     def _rolled_out(self) -> bool:
-        """Whether the odometry includes the distance that the robot has coasted after its last
-        motion."""
+        """Whether the odometry includes the distance coasted after the last motion."""
         odometry = self.odometry
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 

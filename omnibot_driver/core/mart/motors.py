@@ -90,8 +90,7 @@ class Motors:
         return self._right_line, self._left_line
 
     def _spin_speed(self, rate_radps: float) -> float:
-        """Return the speed of each wheel in a turn on the spot at ``rate_radps``, in nominal
-        units."""
+        """Return each wheel's speed in a turn on the spot at ``rate_radps``, in nominal units."""
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:

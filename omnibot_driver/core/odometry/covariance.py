@@ -223,8 +223,7 @@ def _unheard_variance(acceleration: float, fastest: float, until_s: float, from_
 
 @cache
 def _alone(wheels: Kinematics) -> tuple[Pose, ...]:
-    """Return, for each wheel, the motion of the body if this wheel rolls by 1 m, and no other
-    rolls."""
+    """Return, for each wheel, the body's motion if only this wheel rolls, by 1 m."""
     count = len(wheels.joints)
     rates = ([float(n == wheel) for n in range(count)] for wheel in range(count))
     return tuple(

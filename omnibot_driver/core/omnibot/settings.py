@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The settings of an OmniBot board: facts that the user knows and the board's data does not
-show."""
+"""The settings of an OmniBot board: facts that the user knows and the board does not send."""
 
 from dataclasses import dataclass, field
 from typing import Literal

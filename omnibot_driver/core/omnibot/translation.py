@@ -138,8 +138,7 @@ class Translation:
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Record the IMU frames that ``single_imu`` decoded: update mode, schedule and IMU
-        count."""
+        """Update mode, schedule and IMU count by the frames that ``single_imu`` decoded."""
         singles = self._most_singles - self.singles_to_come
         self.singles_to_come = self._most_singles = 0
         if singles:

@@ -17,8 +17,7 @@ _TRIES = 100
 
 
 class UdpSocket:
-    """A socket bound to ``address``. It sends to the sender of the last datagram that it
-    received."""
+    """A bound socket, which sends to the sender of the last datagram that it received."""
 
     def __init__(self, bound: socket.socket) -> None:
         bound.setblocking(False)
