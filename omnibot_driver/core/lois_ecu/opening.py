@@ -51,9 +51,12 @@ CONFIRMED_WITHIN: Final = 0.35
 fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
-LONGEST_SILENCE_S: Final = 1.0
-"""Longest time in s without ticks while rounds follow each other quickly. After a longer time, the
-driver would refuse motion, or regard the board as lost, and then begin the rounds again."""
+TICKS_DUE_S: Final = 1.5
+"""Time in s without ticks after which the rounds no longer wait for ticks before they write the
+period of the ticks again."""
+FAST_TICKS_MS: Final = 200
+"""Longest period of the ticks in ms that each of the first ``ROUNDS`` rounds writes. They then keep
+the ticks away for less than 1 s."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
@@ -80,6 +83,7 @@ class SettingsWriter:
         self._round_at_s = math.inf
         self._date_asked_at_s, self._dates_asked = -math.inf, 0
         self._arrivals: deque[float] = deque(maxlen=6)
+        self._ticks_at_s = self._ticks_written_at_s = -math.inf
         self._rounds = self._repeated = 0
         self.overwritten = False
         """Whether the driver has written the terminal mode. This also overwrites the setting "left
@@ -199,6 +203,7 @@ class SettingsWriter:
         While the settings are unconfirmed, also schedule the next round.
         """
         self._arrivals.append(now)
+        self._ticks_at_s = now
         wanted = self.settings.periods_ms.get(Stream.TICKS)
         period_s = self.ticks_period_s
         if period_s == math.inf:
@@ -227,6 +232,8 @@ class SettingsWriter:
         if now >= self._settings_at:
             self._begin_round(now)
             found += _taken(self._queue, now)
+        if any(map(_sets_ticks, found)):
+            self._ticks_written_at_s = now
         return b"".join(map(self._encoded, found))
 
     def _encoded(self, command: Command) -> bytes:
@@ -262,39 +269,32 @@ class SettingsWriter:
         if self._rounds <= ROUNDS and not self.confirmed:
             self._queue.append((now, outbound.STOP))
             at_s += LINE_S  # a write of its own: its beginning must not meet the end of a setting
-        for command in self._turned(self._rounds):
+        for command in self._turned(self._rounds, now):
             self._queue.append((at_s, command))
             at_s += LINE_S
         self._round_at_s = max(self._round_at_s, at_s)
-        # When a period is written, it begins anew on the board. So maybe no ticks come during the
-        # rounds. If this would last too long, the next round waits for ticks. The place of a
-        # command moves from round to round.
-        ticks_s = min(self.settings.periods_ms.get(Stream.TICKS, 0) / 1000, LONGEST_SILENCE_S)
-        if ROUNDS * (self._round_at_s - now) + ticks_s > LONGEST_SILENCE_S:
-            moved_s = (at_s - now) / ROUNDS
-            ticks_at_s = now + (1 + CONFIRMED_WITHIN) * ticks_s + moved_s
-            self._round_at_s = max(self._round_at_s, ticks_at_s)
 
-    def _turned(self, rounds: int) -> list[Command]:
+    def _turned(self, rounds: int, now: float) -> list[Command]:
         """Return the commands of a round, in an order that changes from round to round.
 
         With a constant order, a board that sends could miss the same line in each round.
 
         The request for a date comes last: the board answers at once, and would miss the next line.
         """
-        rest = list(self.commands())
+        rest = list(self.commands(now))
         place = rounds * len(rest) // ROUNDS % len(rest)
+        after, before = self._repeating(rest[place:]), self._repeating(rest[:place])
         # The board sends no dates after a boot. So each round requests one date.
         periodic = self._answered and self._dates_come_periodically
         asked = [] if periodic else [SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)]
         if self.settings.with_sum:
-            return [*rest[place:], *rest[:place], *asked]
+            return [*after, *before, *asked]
         # The mode overwrites the left short correction, which could be lost with a single line.
         mode = SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
         again = self._left_short_correction()
-        return [mode, again, *rest[place:], again, *rest[:place], again, *asked]
+        return [mode, again, *after, again, *before, again, *asked]
 
-    def commands(self) -> Iterable[Command]:
+    def commands(self, now: float) -> Iterable[Command]:
         """Yield the commands that write settings, except the terminal mode.
 
         ``_turned`` changes their order from round to round.
@@ -304,12 +304,28 @@ class SettingsWriter:
             yield self._left_short_correction()
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
         for stream, period_ms in settings.periods_ms.items():
-            # A written period begins anew on the board, which makes this interval longer. So most
-            # of the later rounds leave the ticks alone: else no interval could confirm the period.
-            if stream is not Stream.TICKS or self._rounds <= ROUNDS or not self._rounds % 3:
+            if stream is not Stream.TICKS or self._writes_ticks(now):
                 yield SetPeriod(stream, period_ms)
         for setting, number in settings.written.items():
             yield WriteSetting(setting, number)
+
+    @property
+    def _slow_ticks(self) -> bool:
+        """Whether five rounds could keep the ticks away for 1 s or more."""
+        return self.settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
+
+    def _writes_ticks(self, now: float) -> bool:
+        """Return whether a round that begins now writes the period of the ticks.
+
+        A written period begins anew on the board, which makes this interval longer. If each round
+        wrote the period, no ticks might come until the rounds are over. So ticks must come before
+        a round writes the period again. Most of the later rounds leave the ticks alone: else no
+        interval could confirm the period.
+        """
+        awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S
+        return not (awaited and self._slow_ticks) and (
+            self._rounds <= ROUNDS or not self._rounds % 3
+        )
 
     @property
     def _dates_come_periodically(self) -> bool:
@@ -318,6 +334,13 @@ class SettingsWriter:
         In this case, a request for one date is harmful: it ends the periodic sending of dates.
         """
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
+
+    def _repeating(self, commands: Iterable[Command]) -> Iterable[Command]:
+        """Yield ``commands``; a long period of the ticks twice, because few rounds write it."""
+        for command in commands:
+            yield command
+            if _sets_ticks(command) and self._slow_ticks:
+                yield command
 
     def recovery(self) -> bytes:
         """Return the lines that restore the mode of a board that is silent or does not obey."""
@@ -340,3 +363,7 @@ class SettingsWriter:
 def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
     while queue and now >= queue[0][0]:
         yield queue.popleft()[1]
+
+
+def _sets_ticks(command: Command) -> bool:
+    return isinstance(command, SetPeriod) and command.stream is Stream.TICKS
