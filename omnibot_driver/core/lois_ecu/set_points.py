@@ -13,12 +13,15 @@ from typing import Final
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import outbound
-from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
-from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm, Stream
+from omnibot_driver.core.lois_ecu.settings import BOOT_PERIOD_MS, LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop until RPM 0/0 is sent. Until then, the tick counts can show the standstill;
-RPM 0/0 ends the counting."""
+"""Shortest time in s from a Stop until RPM 0/0 is sent. Until then, the tick counts can show the
+standstill; RPM 0/0 ends the counting."""
+CLEAR_AFTER_TICKS: Final = 6
+"""Shortest time from a Stop until RPM 0/0 is sent, in periods of the ticks. With slow ticks, the
+proof of the standstill takes longer."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
@@ -85,13 +88,18 @@ class SetPoints:
     @property
     def clears_at(self) -> float:
         """Time in s at which to send RPM 0/0 after a Stop; infinity if RPM 0/0 is not needed."""
-        return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
+        return self.stopped_at_s + self._clear_after_s if self._clears_left else math.inf
+
+    @property
+    def _clear_after_s(self) -> float:
+        ticks_ms = self.settings.periods_ms.get(Stream.TICKS, BOOT_PERIOD_MS)
+        return max(CLEAR_AFTER_S, CLEAR_AFTER_TICKS * ticks_ms / 1000)
 
     def clears(self, now: float) -> bool:
         """Return whether to send RPM 0/0 now. If so, also plan when RPM 0/0 is repeated."""
         if now < self.clears_at:
             return False
-        self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
+        self.stopped_at_s = now - self._clear_after_s + CLEAR_AGAIN_S
         return True
 
     # Motions

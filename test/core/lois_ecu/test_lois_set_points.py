@@ -8,8 +8,9 @@ import pytest
 
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, encode_command
+from omnibot_driver.core.lois_ecu import RecordKind, SetDuty, SetRpm, Stream, encode_command
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
+from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 STOP = b":01000000003b\n"
@@ -130,3 +131,14 @@ def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line:
     assert sent.count(line) == 3
     ecu.record(kind, samples)
     assert line in b"".join(ecu.due(1.0 + 0.01 * step) for step in range(30))
+
+
+@pytest.mark.parametrize(("periods_ms", "after_s"), [({Stream.TICKS: 200}, 2.0), ({}, 2.4)])
+def test_slow_ticks_get_time_to_prove_the_standstill(
+    periods_ms: dict[Stream, int], after_s: float
+) -> None:
+    """RPM 0/0 ends the counting of ticks, so it waits for several tick reports after a Stop."""
+    points = SetPoints(LoisEcuSettings(periods_ms=periods_ms))
+    points.wrote(encode_command(SetRpm(20, 20)), 1.0)
+    points.wrote(STOP, 5.0)
+    assert points.clears_at == pytest.approx(5.0 + after_s)
