@@ -183,7 +183,6 @@ class Ground:
         self._name_from_s = self._named_s = self._stop_again_s = self._ask_s = -math.inf
         self._told: set[str] = set()
         self.heard_s = self.appeared_s = self._gap_s = -math.inf
-        self._silence_s = 0.0  # time between the last two replies
         self.greeted = False
         self.began_s: float | None = None
         self._next_s = -math.inf
@@ -250,7 +249,6 @@ class Ground:
             self._gap_s = now
             self.odometry.heading.may_begin_anew = True
             self._polls.press(words.RMRA)
-        self._silence_s = now - self.heard_s
         self.heard_s = now
 
     def _is_quiet(self, now: float) -> bool:

@@ -122,7 +122,7 @@ class RelativeHeading:
             return False
         if at_s <= before_s:
             return False
-        if self.begins_anew(angle_rad, at_s):
+        if self.begins_anew(angle_rad):
             self._take(angle_rad, when)
             self.from_s = when.from_s
             return False
@@ -143,28 +143,22 @@ class RelativeHeading:
             self.changed_s, self.same = at_s, 0
         return bool(turn_rad)
 
-    def begins_anew(self, angle_rad: float, at_s: float) -> bool:
-        """Return whether a heading shows a restart of the server, and not a turn.
-
-        After a restart, the heading is zero. On some servers, it then shows the turn since the
-        restart.
-        """
-        before_rad = self._angle_rad
-        if not self.may_begin_anew or before_rad is None or abs(before_rad) <= OLD_RAD:
-            return False
-        most_rad = abs(self.rate_radps) * (at_s - self.told_s) + DOUBT_RAD
-        return angle_rad == 0.0 or abs(angle_rad) <= most_rad < abs(angle_rad - before_rad)
+    def begins_anew(self, angle_rad: float) -> bool:
+        """Return whether a heading of zero shows a restart of the server, and not a turn."""
+        known = self._angle_rad is not None and abs(self._angle_rad) > OLD_RAD
+        return self.may_begin_anew and angle_rad == 0.0 and known
 
     def doubt_rad(self, angle_rad: float, at_s: float) -> float:
         """Return the standard deviation, in rad, of the turn since the last heading.
 
-        It is zero unless the server may have restarted, so that ``angle_rad`` may have another zero
-        point than the last heading. It is infinite if the heading certainly begins anew.
+        It is zero unless the server may have restarted. After a restart, the heading is zero, or on
+        some servers the turn since the restart. So a heading near zero may be a turn, or have
+        another zero point. It is infinite if the heading certainly begins anew.
         """
         before_rad = self._angle_rad
         if not self.may_begin_anew or before_rad is None or at_s <= self.told_s:
             return 0.0
-        if self.begins_anew(angle_rad, at_s):
+        if self.begins_anew(angle_rad):
             return math.inf
         most_rad = abs(self.rate_radps) * (at_s - self.told_s)
         same = angle_rad and abs(angle_rad - before_rad) < OLD_RAD

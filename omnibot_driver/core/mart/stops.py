@@ -24,14 +24,7 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
-from omnibot_driver.core.mart.stopping import (
-    ANSWERS,
-    REPEAT_S,
-    ROUNDS,
-    SLOW_STOP,
-    Stopping,
-    is_slow_stop,
-)
+from omnibot_driver.core.mart.stopping import ANSWERS, ROUNDS, SLOW_STOP, Stopping, is_slow_stop
 from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
@@ -256,10 +249,6 @@ class Stops(Ground, ABC):
         elif result is None and motion is not Motion.UNKNOWN and not self._refused:
             lost = self._begun_s < self._started_s and self._seems_present
             if not lost:
-                quiet_s = self._absent_s + min(now - stopping.began_s, ROUNDS * REPEAT_S)
-                restarted = self._silence_s > quiet_s and stopping.began is not False
-                if restarted and motion in UNCONTROLLED:
-                    self.odometry.lose_turn()
                 self._appears(now)  # the server knows of no motion, so maybe it was restarted
         if result is None:
             self._switch_off.doubt()
