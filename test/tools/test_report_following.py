@@ -66,7 +66,7 @@ def test_slow_motors_that_reach_the_commanded_speed_are_good(slow_s: float) -> N
 def test_slow_motors_do_not_hide_a_wrong_scale() -> None:
     """If the robot reaches only 80 % of the commanded yaw rate, the report gives this ratio.
 
-    For two wheels, the advice is a tape measure, not another scale of the odometry.
+    The advice for a robot with two wheels is to measure its turn, not to change a scale.
     """
     commands = stretches(3.0)
     found = verdict(commands, behind(commands, 0.3) * [1.0, 1.0, 0.8])

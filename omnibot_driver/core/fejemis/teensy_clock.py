@@ -188,10 +188,10 @@ class StampedReadings:
         self._stamps: list[float] = []
 
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
-        """Add a reading with the timestamp ``stamp_s``, but at most ``now``.
+        """Add a reading with the timestamp ``stamp_s``, or ``now`` if ``stamp_s`` is later.
 
-        In any case, the timestamp is at least ``SMALLEST_STEP_S`` after the last one of the same
-        kind.
+        A timestamp that is not later than the last one of the same kind is replaced: it is then
+        ``SMALLEST_STEP_S`` after that one.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

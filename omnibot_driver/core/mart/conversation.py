@@ -207,8 +207,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply is recorded as missing, because it may come late. An exception is a controlled
-        move: its stop waits for the reply.
+        The reply is recorded as missing, because it may come late. The reply to a controlled move
+        is not recorded: the driver still waits for it while it stops the move.
         """
         if self.pending is None:
             return None

@@ -128,8 +128,8 @@ class Done:
     def has_run_twice(self) -> bool:
         """Whether the measurements show that the server has run the move twice.
 
-        True if the server has completed the move, but the encoder count is too small for it: then
-        the count is that of a second run, which a stop has cut short.
+        True if the server has completed the move, but the encoder has counted too little. The move
+        then ran again, so that the counting began anew, and a stop has cut the second run short.
         """
         whole = self.completed and not self.ended_early
         return whole and self.stopped_again and self._is_short and self.is_large

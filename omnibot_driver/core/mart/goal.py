@@ -158,7 +158,7 @@ class Move:
         self.said = self.turns = 0
 
     def begin(self, request: Request) -> None:
-        """Count a new move, which ``request`` commands. Also count the turns in a row."""
+        """Count the move that ``request`` commands, and the turns since the last straight move."""
         self.said += 1
         self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 

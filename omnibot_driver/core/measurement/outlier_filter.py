@@ -106,7 +106,7 @@ class OutlierFilter:
         self._imu_leaps = _Spikes(STILL, knocked=3)
         self._motion_leaps = _Spikes(BACK, knocked=0)
         self._lasted_s = 0.0
-        """Duration in s of the last possible displacement with a known duration above 0."""
+        """Duration in s of the last plausible displacement; 0 if there was none."""
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
         """The readings that the filter holds: a displacement that changed implausibly much, and

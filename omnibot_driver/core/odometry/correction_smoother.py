@@ -16,8 +16,8 @@ SPREAD_S: Final = 0.2
 class CorrectionSmoother:
     """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
-    In each step, ``pose`` moves and turns at most as far as the robot could. It first follows the
-    robot's own motion. Then it is corrected, by at most the remaining distance and angle.
+    In each step, ``pose`` first follows the robot's own motion. Then it is corrected, but moves and
+    turns at most as far in this step as the robot could.
     """
 
     def __init__(self) -> None:

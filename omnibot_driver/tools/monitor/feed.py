@@ -57,7 +57,8 @@ class Feed:
 
     Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
 
-    ``dead_man``: the switch whose commands are published; None: the robot must not be moved.
+    ``dead_man``: source of the motion commands that are published; None if the monitor must not
+    move the robot.
     """
 
     def __init__(

@@ -170,8 +170,8 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     """A late reply to a start is not taken for the reply to the stop after it.
 
-    A copy of the IMU check's ``ok`` seems to confirm the start. Then the stop is lost, and the late
-    reply to the start arrives.
+    The driver checks the IMU before it sends the start. A copy of the reply to this check seems to
+    confirm the start. Then the stop is lost, and the true reply to the start arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

@@ -218,10 +218,10 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The user gets the right file although the network has duplicated the driver's own LAST TURN.
+    """The user downloads the record of a turn, and gets the right file.
 
-    LAST TURN requests the record of a turn. Before the user's download, the driver waits until late
-    replies to the copy can no longer arrive.
+    Before, the driver has requested the record for itself, and the network has duplicated this
+    request. So the driver waits until no late reply to the duplicate can arrive any more.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))

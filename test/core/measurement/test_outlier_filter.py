@@ -54,10 +54,10 @@ def trembling(random: Random) -> list[float]:
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Return ``count`` noisy readings of an IMU at rest, with 1 g upward, and with the given jumps.
+    """Return ``count`` noisy readings of an IMU at rest, with 1 g upward, and with ``leaps``.
 
-    ``leaps``: value to add to a reading, in m/s² or rad/s, by the index of the reading and the
-    index of the value in it.
+    ``leaps``: for the index of a reading, and the index of a value in this reading, the number that
+    is added to the value, in m/s² or rad/s.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
