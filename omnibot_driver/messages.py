@@ -269,9 +269,9 @@ def time_message(nanoseconds: int) -> Time:
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
     """Return wall clock minus steady clock, in ns.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``, so only limits
-    of the result are known. Between them, it is the value nearest to ``known_ns``, the previous
-    result.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. So the difference
+    of the clocks is known only within limits. The result is the value within these limits that is
+    nearest to ``known_ns``, the previous result.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

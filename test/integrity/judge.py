@@ -20,9 +20,9 @@ by chance. The judge then also searches for the next decoded frame of the same r
 this frame is also too large, the first decoded frame is wrong.
 """
 REACH_BYTES = 600
-"""Number of received bytes by which the search for a read's frames begins before the read.
+"""Distance, in received bytes, from the start of a search for a read's frames to the read.
 
-In the true stream, the search begins another 300 bytes earlier.
+The search is in the true stream. There, it starts another 300 bytes earlier.
 """
 
 

@@ -80,13 +80,13 @@ def trials(fault: str, scene: str) -> int:
 def one(
     share: float, job: tuple[str, int], faults: Mapping[str, Fault] = FAULTS
 ) -> tuple[Scores, int]:
-    """Run one script with each fault on all boards.
+    """Run one script of a scene with each fault on all boards.
 
     Return the scores, and the number of runs of the driver's session.
 
     ``share``: share of the usual number of trials.
 
-    ``job``: name and seed of the scene.
+    ``job``: name of the scene, and seed of the script.
     """
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))

@@ -32,7 +32,7 @@ READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""For each event in the middle of a stream: the time in s in which the host does not read."""
+"""Events in the middle of a stream, each with the time in s for which the host does not read."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
 """``generate`` with a cache. Callers may get the same stream, so they must not change it."""

@@ -39,8 +39,9 @@ DIGIT: Final = 6e-4
 The larger one applies, because the board prints few digits.
 """
 HALF: Final = 0.51
-"""Upper limit of the tolerance from ``NEAR`` and ``DIGIT``, in units of the last printed digit: 0.5
-for rounding, and 0.01 for single precision. Without a known last digit, there is no such limit.
+"""Largest tolerance for a number that the board reports back, in units of its last printed digit:
+0.5 for rounding, and 0.01 for single precision. While the number of digits is unknown, only
+``NEAR`` and ``DIGIT`` limit the tolerance.
 """
 
 

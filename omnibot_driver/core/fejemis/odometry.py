@@ -208,9 +208,9 @@ class PoseOdometry:
     def _driven_to(self, pose: BoardPose, since_s: float) -> Pose | None:
         """Return the motion from the last accepted pose to this rejected one, by the wheel speeds.
 
-        None if the speeds are unknown, or if rounding may be the reason for the rejection: the
-        pose then does not show a new coordinate frame. ``since_s``: time in s since the last
-        accepted pose.
+        None if the speeds are unknown. Also None if the pose may have been rejected only because
+        of rounding: such a pose does not show a new coordinate frame. ``since_s``: time in s since
+        the last accepted pose.
         """
         assert self._pose is not None
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)

@@ -85,8 +85,8 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings ``found``, with the result of the request if it is known now.
 
-        An unrequested record is removed. While lines of a record arrive, RecordComes replaces an
-        empty result.
+        An unrequested record is removed. If no reading is left while lines of a record arrive,
+        return a RecordComes.
 
         ``prevented``: why the board cannot send the record, as a sentence; empty if it can.
         """

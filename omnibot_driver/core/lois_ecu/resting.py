@@ -26,8 +26,8 @@ LOST_S: Final = 0.25
 """Largest usual mean time in s between the last ``LOST_REPORTS`` reports. Above it, reports are
 lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
-"""Usual longest time in s between two reports. While reports are lost, each report advances this
-module's clock by at most ``REPORT_S``, so that speeds from before a gap are kept."""
+"""Usual longest time in s between two reports. While many reports are lost, this module's clock
+advances by at most ``REPORT_S`` with each report that arrives, so that it keeps earlier speeds."""
 HIDDEN_PART: Final = 0.3
 """Speed of this module's clock, as a fraction of real time, while the board does not report the
 wheel's speed. The slow clock keeps earlier speeds for longer."""

@@ -30,7 +30,7 @@ class SetPoints:
 
     * ``saturated``: number of commands that were slowed, because a value was above its limit.
     * ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-      none was sent. To repeat RPM 0/0, the method ``clears`` sets a later time.
+      none was sent. The method ``clears`` replaces it by a later time, so that RPM 0/0 is repeated.
     * ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
     * ``moved_at_s``: time of the last motion command.
     * ``said_at_s``: time of the last set-point, also of a zero one.

@@ -23,8 +23,8 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    The robot is stopped before a sensor's mode, and before each change that is passed to
-    ``stop_first``. ``want`` and ``stop_first`` may be called at any time.
+    The robot is stopped before the board is brought into a sensor's mode, and before each change
+    that is passed to ``stop_first``. ``want`` and ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:

@@ -170,9 +170,10 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the heading error of the last turn, because the server's record has arrived.
+        """Replace the heading error of the last turn: the server's record of the turn has arrived.
 
-        The gyro's error replaces that of the wheel. Call this before the position changes.
+        The record has the angle by the gyro, so the gyro's error replaces the error of the wheel.
+        Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

@@ -44,9 +44,11 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Correct the line by a measurement: the motor had ``speed`` at ``units``.
+        """Correct ``slope`` and ``offset`` by a measured speed.
 
-        ``speed``: in nominal units.
+        ``units``: the motor units at which the speed was measured.
+
+        ``speed``: the measured speed, in nominal units.
 
         ``doubt``: factor for the assumed standard deviation of the measured speed.
         """

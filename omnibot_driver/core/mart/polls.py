@@ -25,8 +25,9 @@ STILL: Final[Mapping[Word, float]] = {
 }
 DRIVING: Final[Mapping[Word, float]] = {RMRA: MOTION_S, ENC: MOTION_S, MCSTAT: 0.5, VOLTS: 2.0}
 TURNING: Final[Mapping[Word, float]] = {ENC: MOTION_S, RMRA: 0.15, MCSTAT: 0.5}
-"""Periods of the queries in a turn on the spot. VOLTS is left out, because a turn does not need the
-voltage. VOLTS crashes a server that starts up, and in a turn, no reply shows a quick restart."""
+"""Periods in s of the queries in a turn on the spot. A turn does not need the voltage, so VOLTS is
+left out: it crashes a server that starts up, and the replies in a turn do not show whether the
+server has quickly restarted."""
 PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.STILL: STILL,
     State.DRIVING: DRIVING,

@@ -323,7 +323,7 @@ class SpeedLoop(Motors):
             self._clear(now + SETTLE_S)
 
     def missed(self) -> None:
-        """Record that the server did not answer the last change of the units.
+        """Record that the server did not answer the last change of the motors' units.
 
         The change may not have arrived, so the wheel speed ratio is less certain.
         """

@@ -74,8 +74,8 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of earlier requests whose missing reply would look like a reply to a stop
-    command.
+    ``owed``: number of earlier requests that are unanswered. A late reply to one of them would look
+    like a reply to a stop command.
 
     ``move``: the controlled move to stop; None for another motion. The server's reply to the move
     ends the stop.

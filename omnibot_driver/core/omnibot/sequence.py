@@ -93,11 +93,11 @@ class Sequence:
         """Whether the counters at the last pose have two explanations: a restart of the board in
         the gap before this pose, or a loss of all deltas in this gap."""
         self._may_be_new = False
-        """Whether deltas were lost since the last pose, and the counter of the delta after this
-        gap is so low that the board may have restarted in the gap.
+        """Whether the board may have restarted in a gap since the last pose.
 
-        A pause or a reconnection does not change this: the next pose is still the first one after
-        the gap."""
+        True if deltas were lost in the gap, and the counter of the delta after it is low enough for
+        a restart. A pause or a reconnection does not change this: the next pose is still the first
+        one after the gap."""
         self._left: tuple[int, float, int] | None = None
         """What is needed to withdraw a supposed restart: the last counter before it, the arrival
         time of this counter in s, and the first counter after the restart."""

@@ -80,7 +80,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _refuses_left_spin(server: "MartServer") -> bool:
-    """Return whether a motion, a recording or MCS prevents the spin L.
+    """Return whether a motion, a recording or manual control (MCS) prevents the left spin (L).
 
     With the quirk ``left_spin_in_reference_move``, the forward drive RM does not prevent the spin.
     """
@@ -190,7 +190,7 @@ def _change_linear(server: "MartServer", text: str) -> str | None:
 def _measured(server: "MartServer", text: str) -> str | None:
     """Start a move whose distance the server measures by the accelerometer (MCF, MCB).
 
-    The move is simulated like TF and TB.
+    The move is simulated like TF or TB, a straight controlled move forward or backward.
     """
     numbers = wire.fields(text)
     if not numbers:

@@ -209,7 +209,7 @@ class WheelFound:
     def answer(self) -> Fit:
         """The better fit of ``first`` and ``second``, by Akaike's information criterion.
 
-        Neither model assumes anything about the control loop.
+        The models of first and second order assume nothing about the control loop.
         """
         return min(self.first, self.second, key=lambda fit: fit.aic)
 

@@ -30,7 +30,8 @@ FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
 """Time in s within which short steps between timestamps compensate a long one.
 
-A compensated long step is a jump of the timestamps; any other one means missing messages.
+A long step that is compensated is a jump of the timestamps. A long step that is not compensated
+shows that messages are missing.
 """
 
 

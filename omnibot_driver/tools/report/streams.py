@@ -33,9 +33,9 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot without a rate in its diagnostics: the rate of this stream is kept; for a robot
-          with two wheels, the rate is NaN.
-        * Several robots: their common rate; NaN if there is none.
+        * One robot: the last rate in its diagnostics. If they have no rate, this stream's rate is
+          kept, but for a robot with two wheels the rate is NaN.
+        * Several robots: their common rate; NaN if the known rates differ, or if none is known.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]
         if log.alone:

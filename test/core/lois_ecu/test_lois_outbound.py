@@ -101,10 +101,10 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 
 
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
-    """If fourteen adjacent characters are lost, a Stop and a low-pass line can command full duty.
+    """If 14 adjacent characters are lost, a Stop and a setting after it can command full duty.
 
-    The driver therefore sends a setting at least 15 ms after a set-point. If the low-pass comes
-    first, there is no danger.
+    The setting is the low-pass coefficient. The driver therefore sends a setting at least 15 ms
+    after a set-point. If the setting comes first, there is no danger.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))

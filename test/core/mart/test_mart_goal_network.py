@@ -220,9 +220,10 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
-    """A turn whose reply is lost is counted from zero, not from the last count before the turn.
+    """The reply to a turn is lost. The driver still knows that the encoder count began at zero.
 
-    "No motion" in reply to a stop shows that the turn is complete.
+    It does not subtract the last count before the turn. "No motion" in reply to a stop shows that
+    the turn is complete.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))

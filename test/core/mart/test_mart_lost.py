@@ -87,9 +87,9 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
     met: bytes, wait_s: float, delay_s: float
 ) -> None:
-    """A driver whose stop makes the server hang, because the IMU is dead, refuses motion.
+    """The driver's first stop makes the server hang, because the IMU is dead. Motion is refused.
 
-    The driver starts while the server executes RM or B. The stop port hangs, too.
+    The driver starts during a forward (RM) or backward drive (B). The stop port hangs, too.
 
     ``wait_s``: time in s from the driver's start until the IMU works again.
     """
@@ -170,7 +170,7 @@ def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
 def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
     away_s: float, firmware: Firmware
 ) -> None:
-    """A robot that turns about its resting right wheel is stopped by SL and SS.
+    """A robot turns about its resting right wheel. The driver stops it by the commands SL and SS.
 
     Only the right wheel has an encoder, but the server reports a motion in progress.
     """

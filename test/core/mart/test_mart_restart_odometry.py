@@ -107,8 +107,8 @@ def test_the_covariance_includes_the_unknown_turn_if_the_command_ends_in_a_resta
 ) -> None:
     """The server restarts in a curve, and the command ends before the server answers again.
 
-    On some servers, the heading runs on from its new zero, so it is not exactly zero. The driver
-    does not take it for a turn.
+    On some servers, the heading changes further after its restart at zero, so it is not exactly
+    zero. The driver does not take this heading for a turn.
     """
     bench = MartBench(firmware).ready()
     bench.command(0.2, 0.3, drive_s)

@@ -221,9 +221,10 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_queries(
     after_s: float, boot_s: float
 ) -> None:
-    """The server restarts in the stop of its first turn, after its reply to a first SM.
+    """The server restarts while its first turn is stopped, after its reply to a first stop (SM).
 
-    VOLTS would crash the server that starts up. It waits, because the stop took three commands.
+    A voltage query (VOLTS) would crash the server that starts up. The driver delays this query,
+    because the stop took three commands.
     """
     bench = MartBench("source").ready()
     bench.command_until(0.0, 0.5, lambda: not bench.robot.stands, 8.0)

@@ -50,9 +50,10 @@ def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
 
 
 def test_a_motor_that_the_server_has_left_on_is_switched_off() -> None:
-    """MCS switches off a motor that the server has left on, and MSM follows.
+    """The command MCS switches off a motor that the server has left on.
 
-    MSM waits until no late copy of MCS can arrive.
+    The driver then sends MSM, which ends the effect of MCS. Before this, it waits until no late
+    copy of MCS can arrive.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)

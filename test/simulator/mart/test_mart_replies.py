@@ -122,9 +122,9 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 
 
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
-    """At rest, the server refuses CS with one number instead of two, and does not crash.
+    """At rest, the server refuses CS (new speeds) with one number instead of two, without a crash.
 
-    During the drives F and B, the same command crashes the server.
+    During a forward drive (F) or a backward drive (B), the same command crashes the server.
     """
     assert Rig().ask("CS 5") == "fail"
 
