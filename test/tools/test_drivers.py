@@ -24,7 +24,7 @@ def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
 
 
 def test_one_that_is_only_listened_to_does_not_run() -> None:
-    """Topics of a driver that have only subscribers do not show that a driver runs.
+    """A driver does not run if its topics have only subscribers.
 
     The topics exist because a tool has subscribed to them, but no program publishes on them.
     """

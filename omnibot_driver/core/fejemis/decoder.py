@@ -39,10 +39,10 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: with ``line_sums`` auto: whether the last line, apart from heartbeats,
-      contradicts ``sums``. While it does, the driver's lines to the board carry no checksum.
-    * ``contradicted``: with ``line_sums`` on or off: whether the last line contradicts this
-      setting.
+    * ``doubtful``: whether the last line other than a heartbeat contradicts ``sums``, if
+      ``line_sums`` is auto. While this is true, the driver's lines to the board have no checksum.
+    * ``contradicted``: whether the last line contradicts ``line_sums``, if this setting is on or
+      off.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -56,7 +56,8 @@ TICKS_DUE_S: Final = 1.5
 period of the ticks again."""
 FAST_TICKS_MS: Final = 200
 """Longest period of the ticks in ms that each of the first ``ROUNDS`` rounds writes. Each write
-begins a period anew. Up to this period, these rounds delay the ticks by less than 1 s."""
+begins a period anew, but with so short a period, these rounds keep the ticks away for less than
+1 s."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a

@@ -40,7 +40,8 @@ class Upkeep:
         """Use new settings. Changed settings are written to the board.
 
         The robot is first stopped if the drive mode changes, or if a sensor's terminal mode is
-        requested; in duty mode, also if the duty scale changes, or if ``max_duty`` becomes lower.
+        requested. In duty mode, it is also stopped if the duty scale changes, or if ``max_duty``
+        becomes lower.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:

@@ -169,8 +169,8 @@ class Reckoning(CorrectedPose):
     def _doubt_unread_turn(self) -> None:
         """Add an error to the pose at the end of a forward drive (RM).
 
-        The last heading may have been measured before the stop. The robot may have turned since
-        then.
+        Call this if the last heading may have been measured before the stop, because the robot may
+        have turned since then.
         """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)

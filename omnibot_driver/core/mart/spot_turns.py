@@ -24,7 +24,7 @@ OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 
 ``OFF``: in the first EARLY_S (s) of a steady rate, if the driver has not learned from a turn yet.
 
-``OFF_AGAIN``: otherwise. A new start disturbs the motion.
+``OFF_AGAIN``: at all other times. It is larger, because a new start disturbs the motion.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits of what the driver learns from slow turns, as fractions of the commanded rate.

@@ -279,7 +279,7 @@ class FrameDecoder:
         self._wait_for = 0
 
     def _judge(self, stretch: bytes, found: list[Frame], *, closed: bool) -> bool:
-        """Accept certain frames, and discard bytes in which no frame is certain.
+        """Accept the frames that are certain, and discard bytes in which no frame is certain.
 
         Return False if the method could neither accept nor discard anything.
         """

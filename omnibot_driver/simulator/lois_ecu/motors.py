@@ -117,8 +117,8 @@ class Encoder:
     def turn(self, turns: float) -> list[tuple[float, bool, int]]:
         """Turn the disc. Return the edges that passed the sensor, in order.
 
-        An edge is a tuple of its time as a fraction of the step, whether a long level ended at it,
-        and its direction: 1 forward, -1 backward.
+        An edge is a tuple of three values: its time, as a fraction of the step; whether the level
+        that ended at this edge was a long one; and its direction, 1 forward or -1 backward.
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn

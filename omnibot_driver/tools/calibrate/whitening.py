@@ -19,8 +19,8 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
     ``rows``: rows of successive residuals.
 
-    * If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 (only displaced
-      encoder marks) to 0 (only independent errors).
+    * If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0. It is -0.5 if
+      all errors come from displaced encoder marks, and 0 if all errors are independent.
     * If ``lags`` is larger, each value is multiplied by a factor that decreases with the lag.
     """
     every = np.concatenate(rows)

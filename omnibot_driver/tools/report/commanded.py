@@ -85,9 +85,9 @@ def shown(log: Log) -> list[Pair]:
 
 
 def _sampled(series: Series) -> Series:
-    """Return the finite rows that have a timestamp; convert these to the recorder's clock.
+    """Return the finite rows that have a timestamp, with timestamps by the recorder's clock.
 
-    The times of commands, states and e-stops are also by the recorder's clock.
+    The times of commands, states and e-stops are by the recorder's clock, too.
     """
     rows = series.only(series.finite & np.isfinite(series.stamp_s))
     return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)

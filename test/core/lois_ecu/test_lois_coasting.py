@@ -60,7 +60,7 @@ def squared_errors(
 def test_the_variances_of_the_twist_are_honest_while_the_robot_coasts(
     firmware: Any, vx_mps: float, yaw_rate_radps: float
 ) -> None:
-    """The variances of the twist include the unknown time at which the board cuts the power.
+    """The variances of the twist allow for the unknown time at which the board cuts the power.
 
     After a Stop, the board cuts the power only at the next step of its controller.
     """
