@@ -34,9 +34,9 @@ UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard can repeat
 Stop after the shutdown."""
 SILENCE_S: Final = 0.25
-"""Longest wait at shutdown, in s, for the second proof that the robot is at rest (longer for a slow
-board). A Stop that is damaged on the line may move the robot. This proof shows that the last Stop
-did not."""
+"""Longest wait at shutdown, in s, for the second proof that the robot is at rest. For a slow board,
+the driver waits longer. A Stop that is damaged on the line may move the robot; the second proof
+shows that the last Stop did not move it."""
 BOTH_PROOFS_S: Final = 2.4
 """Longest time for both proofs at shutdown together, in s. The guard needs the rest of
 ``driver.LONGEST_END_S`` to repeat Stop."""

@@ -102,8 +102,8 @@ class SharedSession:
           of a refusal.
 
         Raises CommandRefused if ``action`` refuses the command, or if the command may have been
-        sent before or during a recent stall of this process. ``refused`` then gets the reason,
-        unless the queue of events is full.
+        sent before or during a recent stall of this process. The constructor's argument ``refused``
+        is then called with the reason, unless the queue of events is full.
         """
         try:
             with self.lock:

@@ -79,10 +79,10 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A sender whose commands are refused because of a stall is not silent.
+    """The motion monitor has stopped the robot. Motion is refused until the sender is silent.
 
-    The motion monitor has stopped the robot, so the driver also refuses the sender's next command
-    after the stall.
+    A sender whose commands are refused because of a stall is not silent. So the driver also refuses
+    the sender's next command after the stall.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

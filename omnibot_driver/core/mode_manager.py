@@ -222,7 +222,7 @@ class ModeManager:
         """Record that the board has obeyed a reset.
 
         ``remark``: a sentence that says what is not proved about the reset; empty if all is proved.
-        It becomes the answer to the request.
+        A remark becomes the answer to the request.
         """
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()

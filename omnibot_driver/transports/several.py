@@ -298,7 +298,8 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
 
-        A missing line with an open port gets only the bytes that it accepts at once.
+        If the line is missing, but its port is open, the port gets only the part of ``data`` that
+        it accepts at once. The result is then True.
         """
         if self.port is None:
             return True

@@ -81,10 +81,10 @@ class Group:
 
 
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
-    """Return the rows of a table: driver and floor for each share of one core.
+    """Return the rows of a table: the results of driver and floor for each share of one core.
 
-    ``seconds``: duration for each share. If cgroups cannot be used, return a sentence with the
-    reason.
+    ``seconds``: duration of the measurement with each share. If cgroups cannot be used, return a
+    sentence with the reason.
     """
     try:
         return _table(parts, seconds)

@@ -141,9 +141,9 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """If the first poses come late and agree, motion is computed with their heading from then on.
+    """The first poses come late, so the odometry assumes heading 0 until they arrive.
 
-    Until then, the odometry assumes heading 0. Odom does not jump.
+    The poses agree, so later motion is computed with their heading. Odom does not jump.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):

@@ -289,9 +289,10 @@ def test_an_answer_is_read_although_the_name_has_another_address(
 
 
 def test_a_lookup_that_ends_after_an_answer_is_not_used(names: Names, named: UdpPorts) -> None:
-    """A lookup finds another address, but the host answers before the lookup ends.
+    """A host answers while its name is looked up. Then the lookup finds another address.
 
-    When the host is silent again, the port stays open until the next lookup has ended.
+    This address is not used. When the host is silent again, the port stays open until the next
+    lookup has ended.
     """
     names.wait_for(1, named)
     while named._name._looks_up:

@@ -46,8 +46,8 @@ MARKED_S: Final = PERIOD_S
 arrives between these two. They then probably belong to different samples.
 """
 PATIENCE: Final = 60
-"""Number of intervals after which the first line of a sample is decided, even if the magnitude of
-``_evidence_s`` is still below ``KNOWN_S``.
+"""Number of intervals after which ``ImuPairs`` decides which line of a sample comes first, even if
+the magnitude of ``_evidence_s`` is still below ``KNOWN_S``.
 """
 MOST: Final = 10
 """Largest magnitude of a counter in ``_outside``."""

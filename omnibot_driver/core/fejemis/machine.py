@@ -28,8 +28,8 @@ Of several commands in this time, only the newest is sent. A stop of the lift is
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage. The driver
-lowers the voltage until the checksum detects damage to the line.
+"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage. The checksum
+detects damage only in some texts of the voltage, so the driver may send a lower voltage.
 """
 LEAST_TIME_S: Final = 0.04
 

@@ -65,8 +65,9 @@ SWINGING_M: Final = 0.055
 """Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks:
 ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
-"""Standard deviation, in m, that is added to the robot's x and to its y after a wheel without
-counted ticks has rolled 1 m at an oscillating speed. ``SWINGING_M`` is applied as well.
+"""Standard deviation, in m, of the additional errors of the robot's x and of its y after a wheel
+without counted ticks has rolled 1 m at an oscillating speed. The error ``SWINGING_M`` of the
+wheel's distance is added separately.
 """
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviation of a wheel's distance after lost reports, as a fraction of the distance that

@@ -37,10 +37,11 @@ After a shorter time, the wheels may also have rolled back.
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Limit, in s, for the time since the last tick report. When the unit of the board's clock becomes
-unknown, the driver replaces a longer time by this limit.
+"""Limit, in s, for the time since the previous tick report, if the unit of the board's clock is no
+longer known after the new report.
 
-The time determines how far the wheels may have rolled back.
+From this time, the driver computes how far the wheels may have rolled back. If the time is longer,
+the driver uses this limit instead.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.

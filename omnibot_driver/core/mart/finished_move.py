@@ -138,7 +138,8 @@ class Done:
     def ended_late(self) -> bool:
         """Whether the reply came so late that the server may have run the move twice.
 
-        The server answers each run, and the first answer may be lost.
+        The server replies at the end of each run. If the first reply is lost, the second one seems
+        to be a late first one.
         """
         return self.lasted_s >= TWO * self.usual_s
 
@@ -157,7 +158,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply belongs to another request. If the driver has sent a stop after the reply, the
-        stop has ended the first run of the move.
+        Such a reply belongs to another request, so the move was still in its first run. A stop that
+        the driver sent after this reply has ended the first run.
         """
         return self.lasted_s < FULL * self.usual_s

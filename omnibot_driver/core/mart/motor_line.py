@@ -74,7 +74,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Lower the offset until the line gives no speed for ``units``: the motor does not turn.
+        """Lower the offset so that the line gives no speed at ``units``: the motor has not turned.
 
         An obstacle may be the cause, so the offset becomes as uncertain as at the beginning.
         """

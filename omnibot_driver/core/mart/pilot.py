@@ -50,8 +50,8 @@ VOLTS_S: Final = 10.0
 """Time in s since the last voltage query (VOLTS), after which unanswered requests no longer delay
 the next VOLTS.
 
-The limit does not apply in the first STARTS_UP_S after a motion: in a turn on the spot, the driver
-sends no VOLTS, however long the turn lasts (see ``_may_ask_volts``).
+In a turn on the spot, however long, the driver sends no VOLTS. So in the first STARTS_UP_S after a
+motion, unanswered requests delay VOLTS in any case (see ``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -110,7 +110,8 @@ class Pilot(Hearing):
     def busy(self, now: float) -> bool:
         """Return whether the server is busy, so that the driver expects no reply.
 
-        A server that was silent before the stop of a drive is not busy: it may be lost.
+        If the server was already silent before the driver began to stop a drive, the result is
+        False, because the server may be lost.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s

@@ -22,8 +22,8 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 OLD_RAD: Final = 0.01
 """Largest difference in rad between two headings that are regarded as the same heading.
 
-A forward drive (RM) begins at the heading zero: an unchanged heading after the start may be a late
-reply.
+A forward drive (RM) begins at the heading zero. If the heading after its start command is the same
+as before, it may be from a late reply, or the start command may be lost.
 """
 MOST_RAD: Final = 1e7
 """Limit in rad. A reported heading of this size or more is rejected.

@@ -177,9 +177,10 @@ class SpeedLoop(Motors):
 
     @property
     def left_over_right(self) -> float:
-        """Expected ratio of left to right wheel speed at the current units, by the learned lines.
+        """Expected ratio of left to right wheel speed at the current motor units.
 
-        If both motors have equal units, the ratio is ``balance``.
+        The driver has learned how the speeds depend on the motor units. If both motors have equal
+        units, the ratio is ``balance``.
         """
         return self._ratio(self._right.units, self._left.units)
 

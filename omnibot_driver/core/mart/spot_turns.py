@@ -200,9 +200,10 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the rate to learn: the measured rate ``seen_radps``, but not less than a limit.
+        """Return the magnitude of the turn rate that the driver learns from a turn, in rad/s.
 
-        The limit is LEAST_LESSON times the commanded rate.
+        The driver learns the measured rate ``seen_radps``. If the measured rate is lower than
+        LEAST_LESSON times the commanded rate, the driver learns this limit instead.
         """
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 

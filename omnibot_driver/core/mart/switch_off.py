@@ -22,9 +22,9 @@ RELEASE: Final = MSM.request()
 MOST_MISSES, MOST_MISSES_DISTURBED = 4, 8
 """Number of unanswered requests after which the driver no longer tries to switch off the motors.
 
-The limits are for a server that does not answer MCS. ``MOST_MISSES_DISTURBED`` applies to a network
-that loses other replies, too. If a network loses one datagram of five, four exchanges in a row fail
-once in sixty times.
+The limits are for a server that does not answer MCS, which writes the motors' speeds.
+``MOST_MISSES_DISTURBED`` applies to a network that loses other replies, too. If a network loses one
+datagram of five, four exchanges in a row fail once in sixty times.
 """
 NO_MCS: Final = (
     "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"

@@ -90,8 +90,8 @@ class WheelCount:
         * The server has acknowledged the motion. Nothing changes, and the result is False.
         * A count of the motion has come, without an acknowledgement. The motion had begun, so the
           server was restarted. The pose already includes the counts of the motion.
-        * Neither has come. The motion did not begin, and the count continues from its value before
-          the start command.
+        * Neither an acknowledgement nor a count has come. The motion did not begin, and the count
+          continues from its value before the start command.
         """
         if self._confirmed:
             return False

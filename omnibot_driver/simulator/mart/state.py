@@ -44,7 +44,7 @@ class ServerState:
     * ``crashed``: why the server ended; empty while it runs.
     * ``alarm``: the kind of motion that the server supervises now, or None.
     * ``starting``: the kind of motion whose command is not answered yet, or None.
-    * ``custom``: parameters that SLMP and SSP have set.
+    * ``custom``: parameters that the commands SLMP and SSP have set.
     * ``sampling_since_s``: time at which a motion began to use a sonar, or -1.
     * ``front_m``, ``rear_m``, ``dock_m``: distances from the start to the walls and to the dock.
 

@@ -81,7 +81,7 @@ def driven(
     turn_rad: float,
     seconds: float,
 ) -> Column:
-    """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
+    """Drive the robot by a control law; return the odometry's poses, (n, 3), in m, m and rad.
 
     ``turn_rad``, ``seconds``: expected turn and duration. Raises ToolError if the drive fails.
     """

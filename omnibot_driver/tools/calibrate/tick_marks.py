@@ -51,9 +51,10 @@ class Marks:
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors that the marks cause in ``count`` times between ticks.
+        """Return the relative errors that the marks cause in the times between successive ticks.
 
-        ``first``: number of the mark at which the first time begins.
+        ``first``: number of the mark at which the first of these times begins. ``count``: how many
+        of these times there are.
         """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 

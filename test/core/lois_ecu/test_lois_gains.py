@@ -109,8 +109,8 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
     """A setting is sent at least 15 ms after a Stop, unless the driver is called too seldom.
 
-    Bug: the low-pass followed the first Stop at once. If fourteen characters were lost, the rest of
-    both lines could command full duty.
+    Bug: the driver sent the low-pass setting directly after the first Stop. If fourteen characters
+    of these two lines were lost, the remaining ones could command full duty.
     """
     points = SetPoints(HOST_GAINS)
     writer = SettingsWriter(HOST_GAINS, points)

@@ -49,9 +49,10 @@ def longest_gap_s(bench: Bench, ours: LoisEcuSettings) -> float:
 def test_ticks_keep_coming_while_many_settings_are_written(firmware: str, ticks_ms: int) -> None:
     """A setting changes while the robot drives. The driver writes all settings in several rounds.
 
-    Each written period of the ticks begins anew on the board. The ticks keep coming between the
-    rounds. Otherwise the driver would refuse motion, or regard the board as lost and begin the
-    rounds again, without end. The ticks then confirm the settings, while the robot still drives.
+    When the period of the ticks is written, the board begins this period anew, so the next tick is
+    delayed. Without ticks between the rounds, the driver would refuse motion, or regard the board
+    as lost and begin the rounds again, without end. But the ticks keep coming, and they finally
+    confirm the settings, while the robot still drives.
     """
     ours = replace(ALL, periods_ms={Stream.TICKS: ticks_ms, **SLOW})
     bench = Bench(firmware, ours)

@@ -84,9 +84,10 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
-    """A terminal mode that is taken back does not end the stop that a new drive mode needs.
+    """The user sets a drive mode and a terminal mode, and then takes the terminal mode back.
 
-    Refusals then name only the drive mode.
+    The robot is still stopped, because the change of the drive mode needs it. Refusals then name
+    only the drive mode.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

@@ -121,9 +121,9 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """If most reports are lost, many equal reports prove that a wheel rests, even without a fall.
+    """If most reports are lost, many equal reported speeds prove that a wheel rests.
 
-    The speed may have fallen in a gap.
+    The reports show no fall of the speed, but the speed may have fallen between two of them.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

@@ -196,11 +196,12 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 
     The driver provides for both cases:
 
-    * The wheel may be at rest: the driver sends RPM 0/0, because the old speed may prevent power.
+    * The wheel may be at rest, and the board may use its old speed, so that the motor gets no
+      power. So the driver sends RPM 0/0, which clears this speed.
     * The wheel may roll: the odometry keeps the distance.
 
-    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. A wheel at −68 RPM
-    gets full power.
+    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. At −68 RPM, the
+    wheel rolls with full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

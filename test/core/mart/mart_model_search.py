@@ -20,11 +20,12 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 
 
 def trouble(world: World) -> str:
-    """Return what is wrong in this world, or an empty text if nothing is wrong.
+    """Return what is wrong with the server or the robot, or an empty text if nothing is wrong.
 
     * If the IMU is dead, or if the driver has given up: only a crash of the server is wrong.
     * While the driver finds out which motion is in progress: a crash, or a command port that hangs.
-    * At all other times: a crash, a command port that hangs, or one of the other faults.
+    * At all other times: a crash, a command port that hangs, a next stop that will hang, refused
+      motions of which the driver does not know, or a robot that nothing stops.
     """
     server, driver = world.server, world.driver
     if server.crashed:

@@ -48,9 +48,10 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """After SL (stop port), the driver does not send SRM, the usual stop of a forward drive.
+    """The network loses the first stops, and the driver sends SL (stop port) in their place.
 
-    SRM would then hang the server. The first stops were lost.
+    After SL, the driver does not send SRM, the usual stop of a forward drive. SRM would then hang
+    the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""

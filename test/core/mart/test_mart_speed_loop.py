@@ -162,9 +162,9 @@ def test_unanswered_changes_are_judged_by_the_measured_speeds(
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """The driver assumes at most 8 % difference between the motors, whatever it measures.
+    """The driver assumes at most 8 % difference between the motors, even if it measures more.
 
-    A change of speed that the network duplicates looks like unequal motors.
+    The motors may be equal: if the network duplicates a change of speed, they look unequal.
     """
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)

@@ -110,10 +110,10 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """After something has slowed a turn of 0.5 rad/s, the robot turns at less than 0.9 rad/s.
+    """Something slows a turn of 0.5 rad/s for a while. Afterwards, the turn is not much too fast.
 
-    ``learned``: whether the driver has learned the motors' speed in an earlier turn. The limit is
-    then 0.6 rad/s.
+    ``learned``: whether the driver has learned the motors' speed in an earlier turn. If so, the
+    robot turns at less than 0.6 rad/s, otherwise at less than 0.9 rad/s.
     """
     bench = MartBench("source").ready()
     if learned:

@@ -108,9 +108,9 @@ def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
 def test_a_robot_that_came_to_rest_while_only_poses_arrived_is_where_they_put_it(
     frame: str, poses: int
 ) -> None:
-    """If poses show a robot at rest, a displacement that is lost later is not taken for a turn.
+    """The robot turns at 2 rad/s. Then only poses arrive, and they show that the robot is at rest.
 
-    The robot turned at 2 rad/s until only poses arrived.
+    A displacement that is lost later is not taken for a turn.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)

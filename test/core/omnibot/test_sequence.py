@@ -36,8 +36,8 @@ def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
     """The host hangs for up to 5 s. The next delta comes late, but its SEQ is the next one.
 
-    No delta is regarded as lost. The board sends no poses, so the driver supposes no restart, which
-    only a pose could disprove.
+    No delta is regarded as lost. The driver does not assume a restart, because the board sends no
+    poses, and only a pose could disprove a restart.
     """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
@@ -81,8 +81,8 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 ) -> None:
     """The board sends no poses, which could disprove a restart after a pause.
 
-    So the driver suspects a restart only if the next count is at most the number of deltas that
-    would be lost without a restart.
+    If the board has not restarted, the next count shows how many deltas are lost. The driver
+    suspects a restart only if the count is not larger than this number of deltas.
     """
     sequence = begun(count)
     sequence.pause()
