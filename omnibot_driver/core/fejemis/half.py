@@ -123,8 +123,9 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        If a message shows a restart of the board, the board's earlier times are deleted. All
-        messages before this one need these times, so they must be handled first.
+        A message may show a restart of the board. Then the known times of the board and of its
+        lines are deleted. The messages before the restart need these times, so the caller must
+        handle them first.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

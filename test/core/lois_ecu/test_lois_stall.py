@@ -119,7 +119,7 @@ def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
     """A wheel whose reported speed stays the same, above its set-point, looks stalled.
 
-    The speed controller gives no power at such a speed, so a rolling wheel would become slower.
+    The speed controller gives no power at such a speed, so the speed of a rolling wheel would fall.
     """
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)

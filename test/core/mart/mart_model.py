@@ -281,9 +281,9 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply may belong to an earlier command. The driver never takes such a
-    reply for the answer to a check, a controlled move or MSM (end of the direct control). A check
-    or a move takes longer than a reply can be late.
+    ``late``: whether the reply may belong to an earlier command. If so, the driver never takes it
+    for the answer to a check, a controlled move or MSM (end of the motors' direct control). Checks
+    and moves last so long that no late reply can arrive at their end.
     """
     driver = world.driver
     state = driver.state
