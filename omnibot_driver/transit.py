@@ -201,7 +201,7 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return the least time in s by which a message may be late; it may be negative.
+        """Return the least time in s by which a message is late; negative if it may be in time.
 
         ``difference_s``: arrival by our clock minus sending by the sender's clock.
         """

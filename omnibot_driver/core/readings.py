@@ -90,8 +90,9 @@ class PoseReading:
       DisplacementReading does not include them.
     * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame. A
       displacement before it may have shown the same restart.
-    * ``ambiguous``: whether the counters fit a restart in a gap before this pose as well as a
-      loss of everything in this gap. Only the pose itself can then decide.
+    * ``ambiguous``: whether the counters have two explanations: a restart of the board in a gap
+      before this pose, or a loss of all displacements in this gap. Only the pose itself can then
+      show which explanation is true.
     """
 
     x_m: float

@@ -2,8 +2,8 @@
 
 """The floor for a LOIS ECU: the smallest program with the same output, without any checks.
 
-``PORT NAMESPACE``: publish an Odometry and a JointState for every group, write a line for every
-cmd_vel.
+Arguments: PORT NAMESPACE. The program publishes an Odometry and a JointState for every group of
+lines, and writes a line for every cmd_vel.
 """
 
 import math

@@ -120,7 +120,10 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return the rows of a table of the cost of each task, from the floor to the driver."""
+    """Return the rows of a table of the costs of the floor, of each relay, and of the driver.
+
+    Each relay has one more task than the relay before.
+    """
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))

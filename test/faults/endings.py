@@ -62,7 +62,7 @@ class Ending:
 
     ``full``: whether the driver's port is full of old commands.
 
-    ``read``: whether the driver ends only when it reads data again.
+    ``read``: whether the driver ends only at its next read of data.
 
     With ``full`` or ``read``, the robot may drive longer.
     """

@@ -145,7 +145,7 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Cut the network in both directions for ``seconds``. After that, the robot must stop.
+    """Cut the network in both directions for ``seconds``, then check that the robot stops.
 
     While the network is cut, the robot drives on, because no stop can reach the controller.
     """

@@ -120,10 +120,9 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """The judge accepts the previous set-point just after a new one, but no uncommanded one.
+    """Just after a write, the judge accepts a frame with the set-point of the previous write.
 
-    It accepts a frame with the set-point of the previous write. It reports a frame whose set-point
-    is neither in the current write nor in the previous one.
+    It reports a frame whose set-point is neither in the current write nor in the previous one.
     """
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")

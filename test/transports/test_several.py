@@ -249,9 +249,9 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
     ends: Ends, tmp_path: Path
 ) -> None:
-    """Two drivers wait for two lines. One driver has the second line, the other one the first.
+    """Two drivers wait for the same two lines, and each driver has one of the lines.
 
-    The driver without the first line gives up. So the other driver gets both lines.
+    The driver without the first line gives up, so the other driver gets both lines.
     """
     late = tmp_path / "late"
     openers = [partial(SerialPort, path, 115200) for path in (str(late), ends.paths[1])]

@@ -2,7 +2,7 @@
 
 """Speed limits for commands. They never change the direction of the linear velocity.
 
-Call ``require_finite`` first: except ``SpeedLimits.allow``, no function accepts NaN or infinity.
+Call ``require_finite`` first: only ``SpeedLimits.allow`` accepts NaN and infinity.
 """
 
 import math

@@ -97,7 +97,8 @@ class ImuPairs:
         unknown."""
         self._evidence_s = 0.0
         """Sum of the intervals before gyro lines, minus the sum of those before acceleration lines,
-        in s. Positive if the gyro line of a sample comes first: the interval before it is longer.
+        in s. A positive sum shows that the gyro line of a sample comes first, because the interval
+        before the first line of a sample is longer.
         """
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None

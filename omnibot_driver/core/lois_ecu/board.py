@@ -111,8 +111,8 @@ class LoisEcuBoard(Board):
     def shows_standstill(self) -> bool:
         """Whether unchanged ticks would show that both wheels are at rest.
 
-        The public firmware counts a wheel's ticks only while the RPM target of this wheel is
-        positive.
+        With the public firmware, they show it only while the RPM targets of both wheels are
+        positive: the firmware counts no ticks of a wheel with another target.
         """
         return self._ecu.translation.odometry.counting
 

@@ -29,8 +29,8 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: standard deviation of each wheel's speed while it coasts, with the sign of the
-    speed. The errors of both wheels are correlated.
+    ``coasting_mps``: standard deviation, in m/s, of each wheel's speed while the wheel coasts.
+    The value has the sign of the speed, because the errors of the two wheels are correlated.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

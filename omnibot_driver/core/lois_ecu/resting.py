@@ -23,8 +23,8 @@ WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 LOST_REPORTS: Final = 4
 LOST_S: Final = 0.25
-"""Largest usual mean time in s between the last ``LOST_REPORTS`` reports. Above it, reports are
-lost, or the board rarely sends reports."""
+"""Limit for the mean time in s between the last ``LOST_REPORTS`` reports. If the mean time is above
+the limit, reports are lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
 """Usual longest time in s between two reports. While many reports are lost, this module's clock
 advances by at most ``REPORT_S`` with each report that arrives, so that it keeps earlier speeds."""

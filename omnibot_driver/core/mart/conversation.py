@@ -274,8 +274,9 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        ``word``: the command that is pending. Only a query can get such a copy: an equal reply to
-        another query or to a move has just come, and the last reply to ``word`` was different.
+        ``word``: the command that is pending. The result is True only if ``word`` is a query,
+        the last reply to ``word`` was different, and an equal reply to another query or to a move
+        has just come.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

@@ -98,8 +98,8 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Return whether the driver must now check a dead IMU again.
+        """Return whether the driver must now repeat the check of a dead IMU.
 
-        Only the check RST IMU is repeated in this way, because it does not move the robot.
+        Only the check RST IMU is repeated, because it does not move the robot.
         """
         return self.dead and self.word is RESET and now >= self.again_s

@@ -37,7 +37,7 @@ class MartOdometry(Reckoning):
         """Return the odometry, predicted to ``now``.
 
         ``blind_since_s``: start time of a controlled move that is in progress, or that the server
-        may run a second time. None otherwise, and if the server is lost.
+        may run a second time. None without such a move, and while the server is lost.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

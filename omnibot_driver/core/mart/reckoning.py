@@ -245,8 +245,9 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        Both are zero unless the start command may have been lost. If the last encoder count is
-        from after the start of the motion, the pose lacks this motion.
+        Both are zero, except while the start command may have been lost. The pose then does not
+        contain the last encoder count. If this count is from after the start of the motion, the
+        server has counted from zero, and the pose lacks the motion that the count shows.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

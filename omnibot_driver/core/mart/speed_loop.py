@@ -152,8 +152,8 @@ class SpeedLoop(Motors):
         ``units``: the units that both motors have; None for the current units of each motor.
 
         A motor with MOST_DEAD units or more that does not turn is blocked, so nothing is learned
-        from it. If ``units`` is None, the line of a motor that should certainly turn
-        (``MotorLine.turns``) does not change either.
+        from it. If ``units`` is None and a motor should certainly turn (``MotorLine.turns``), the
+        line of this motor stays unchanged, too.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

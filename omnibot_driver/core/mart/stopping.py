@@ -191,8 +191,9 @@ class Stopping:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
         If there are at most ``owed`` doubtful replies, all of them may be late replies to earlier
-        requests, and the value is None. If there are more, the value is the last doubtful reply
-        with a plausible number, or the last doubtful reply if no number is plausible.
+        requests, and the value is None. If there are more than ``owed``, the value is the last
+        doubtful reply with a plausible number. If no number is plausible, it is the last doubtful
+        reply.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -63,11 +63,11 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel, which has no encoder, may turn unseen.
 
-``STUCK_S``: before the driver stops a robot that does not seem to move. Perhaps only the right
-wheel is stuck.
+``STUCK_S``: time before the driver stops a robot that does not seem to move. The left wheel may
+turn in this time if only the right wheel is stuck.
 
-``COASTS_S``: after the driver has stopped the robot because a wheel is blocked. The server ends the
-measurement when the right wheel is at rest, but the left wheel may still coast.
+``COASTS_S``: time after the driver has stopped the robot because a wheel is blocked. The server
+ends the measurement when the right wheel is at rest, but the left wheel may still coast.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -295,12 +295,12 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Detect a stop port that still waits for the end of the motion that it should stop.
 
-        This is the case if the server answers a stop command after the driver has used the stop
-        port. The port could then hang the next forward drive (RM); see
+        The stop port still waits if the server answers a stop command after the driver has used the
+        stop port. The port could then hang the next forward drive (RM); see
         docs/internals/mart_protocol.md.
 
-        A reply with a number does not show this. It answers an earlier query, or the stop command
-        of a turn on the spot, which leaves the stop port free.
+        A reply with a number is ignored. It answers an earlier query, or the stop command of a turn
+        on the spot. Such a stop command leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

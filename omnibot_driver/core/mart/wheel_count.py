@@ -26,8 +26,8 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of unchanged counts after a start command, after which the driver assumes that the command
-was lost. A count is unchanged if it is within 1 of the last count before the command."""
+"""The driver assumes that a start command was lost when it has received ``SAME_TIMES`` unchanged
+counts. A count is unchanged if it is within 1 of the last count before the command."""
 
 
 @dataclass(frozen=True, slots=True)

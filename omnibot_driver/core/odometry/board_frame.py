@@ -14,9 +14,10 @@ from omnibot_driver.core.odometry.pose_gate import PoseGate, expected
 
 BEGUN_M: Final = 0.005
 BEGUN_RAD: Final = 0.01
-"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations, in m and rad, from the pose that is expected if
-the board began at zero. A pose within them shows by its value alone that the board did: only
-rounding makes it deviate. A robot that drives to the origin in a gap rarely stops so near to it.
+"""``BEGUN_M``, ``BEGUN_RAD``: largest deviations, in m and rad, of a pose from the pose that is
+expected if the board began at zero. A pose within these limits shows that the board began at zero:
+only rounding makes such a pose deviate. A robot that drives to the origin in a gap rarely stops so
+near to the origin.
 """
 
 
@@ -54,10 +55,9 @@ class BoardFrame:
     def continues(self, told: Pose, gap: Covariance) -> bool:
         """Return whether a pose continues the board's frame, although its counter began anew.
 
-        The cause is a restart of the board, or a damaged pose just before this pose. A restart
-        takes longer than a period, so the board did not restart if no displacement was lost since
-        the last accepted pose. The result is True if none was lost, and the pose is near the
-        expected place.
+        A counter begins anew if the board restarts, or after a damaged pose. A restart takes longer
+        than a period, so displacements are lost in it. The result is True if no displacement was
+        lost since the last accepted pose, and the pose is near the expected place.
 
         ``gap``: covariance of the motion that was lost since the last accepted pose.
         """

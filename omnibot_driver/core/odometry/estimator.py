@@ -64,11 +64,11 @@ class Odometry:
         self.configure(settings)
         self._backlog = PendingDisplacements()
         self._since_gap: Pose | None = None
-        """The pose that the board would report now if it had begun a new frame in the longest gap
-        since its last pose.
+        """The pose that the board reports now if it began a new frame in the longest gap since its
+        last pose.
 
         None if no displacement was lost since this last pose, or if the robot was near the origin
-        of the board's frame before the gap.
+        of the old frame before the gap.
         """
         self._gap_lost = 0
         """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""

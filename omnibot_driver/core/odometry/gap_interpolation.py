@@ -65,7 +65,7 @@ class GapInterpolation:
     def before(self, told: Pose, waiting: PendingDisplacements) -> Pose:
         """Return the pose before the waiting displacements, if ``told`` is the pose after them.
 
-        Displacements that were lost among the waiting ones are included by interpolation.
+        If displacements were lost among the waiting ones, the lost motion is interpolated.
         """
         start, readings = waiting.before(told), waiting.readings
         if not any(reading.lost for reading in readings):

@@ -51,9 +51,9 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` is True although the board has probably continued. This is
-      so after a pause of the board, if a board that continued lost fewer deltas than a restarted
-      one, and after a silence, if the delta has the next count.
+    * ``doubtful``: whether ``restarted`` is True although the board has probably continued. Two
+      findings show this. After a pause: fewer deltas were lost if the board continued than if it
+      restarted. After a silence: the delta has the next count.
     """
 
     lost: int

@@ -96,10 +96,10 @@ class DeviceClock:
         """Number of the next tick, and the earliest time in s at which the last byte of its sample
         can arrive."""
         self._cut_off: Point | None = None
-        """A bound from the incomplete sample at the end of the last read; None if there was none.
+        """Earliest end of the sample that the last read cut off; None if it cut off none.
 
         A pair: the number of the sample's tick, and the earliest time in s at which the sample can
-        be complete. The bound is used only if the rest of the sample arrives.
+        be complete. The clock uses the pair only if the rest of the sample arrives.
         """
 
     @property

@@ -42,9 +42,9 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: for each encoder, the factors by which the board multiplies the durations of
-    short and of long levels. The simulated levels have the lengths for which these factors are
-    exact.
+    ``corrections``: for each encoder, one factor for the short levels of its signal, and one for
+    the long levels. The board multiplies the durations of the levels by these factors. The
+    simulated levels have the lengths for which the factors are exact.
     """
 
     def __init__(

@@ -56,7 +56,7 @@ class Motion:
 
     * ``running``: whether the motion is in progress; the server then refuses other motions.
     * ``watching``: whether the module ``alarms`` supervises the motion.
-    * ``posts``: number of reported starts and ends for which no port has waited yet.
+    * ``posts``: number of reports of a start or an end that are kept until a port waits for one.
     * ``right``, ``left``: motor registers, as the server knows them.
     * ``sampled_s``: time of the last sample of the IMU, or -1.
     * ``moved_s``, ``turned_s``: first and last time at which the right wheel turned.

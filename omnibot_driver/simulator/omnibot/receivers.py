@@ -51,9 +51,9 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does, but discard an FF and the next byte if this is not FE.
+    """Find frames as ``counting`` does, but discard an FF that is not followed by FE.
 
-    So the header in the bytes FF FF FE is missed.
+    The byte after this FF is discarded, too. So the header in the bytes FF FF FE is missed.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True

@@ -183,9 +183,9 @@ def outcome(reads: list[Read]) -> Outcome:
 
 
 def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
-    """Return whether a program that sees only the stream can recognize this false pair.
+    """Return whether a program that sees only the stream can recognize that ``pair`` is false.
 
-    ``pair``: the sample numbers of its two lines. The pair is false, so the numbers differ.
+    ``pair``: the sample numbers of its gyro line and its acceleration line. The numbers differ.
     """
     wanted = {("gyro", pair[0]), ("acc", pair[1])}
     found = [(now, line) for now, lines in reads for line in lines]

@@ -58,10 +58,11 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 
 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
-    """The driver has counted several samples as lost that may only have been late.
+    """The driver has counted several samples as lost, although they may only have been late.
 
-    A sample arrives earlier than this count permits. The driver reduces the count only as far as
-    necessary. Otherwise the stamps would be several periods too old.
+    Then a sample seems to arrive before its sampling time, so fewer samples were lost. The driver
+    reduces the count of lost samples only as far as necessary. Otherwise the stamps would be
+    several periods too old.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []

@@ -58,7 +58,8 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
     """The manual's example of a motion line becomes another motion by the loss of two characters.
 
-    The checksum still fits. So the driver commands this motion with other digits.
+    The checksum still fits. So the driver does not send the example, but a line that commands the
+    same motion with other digits.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")

@@ -278,7 +278,7 @@ def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
 def test_a_mirrored_reverse_is_driven() -> None:
     """The robot follows a curve backward with a firmware that mirrors the front wheel's angle.
 
-    The angle is the same as in a curve forward.
+    The front wheel then has the same angle as if the robot followed this curve forward.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)

@@ -135,9 +135,9 @@ def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
 
 
 def test_nothing_deviates_before_enough_groups_are_known() -> None:
-    """No delay is regarded as irregular before enough tick reports have arrived.
+    """Every delay is regarded as regular until enough tick reports have arrived.
 
-    The same applies while the unit of the board's clock is unknown.
+    Every delay is also regarded as regular while the unit of the board's clock is unknown.
     """
     board = BoardTime()
     assert board.deviation_s(0, "ns", 5.0) == (0.0, False)

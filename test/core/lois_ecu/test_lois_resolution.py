@@ -100,7 +100,7 @@ def test_wheels_that_roll_back_are_no_restart(
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
     """The distance of a drive out and back is right within two ticks or 0.03 m, the larger of both.
 
-    Only the real restart at the end is taken for a restart.
+    The driver detects no restart during the drive. It detects the real restart after the drive.
     """
     ours = LoisEcuSettings(ticks_per_revolution=per_turn)
     translation, odometry = Translation(ours), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

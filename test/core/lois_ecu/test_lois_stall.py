@@ -152,9 +152,10 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel that the odometry assumes to be at rest looks stalled if it cannot start by itself.
+    """A wheel that the odometry assumes to be at rest looks stalled if it gets no power.
 
-    Its reported speed is just above its set-point, so the speed controller gives no power.
+    The reported speed of the wheel is just above its set-point. So the speed controller gives no
+    power, and the wheel cannot start by itself.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))

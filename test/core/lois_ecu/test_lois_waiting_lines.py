@@ -48,8 +48,8 @@ def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
 ) -> None:
     """While the robot drives, the next wake-up of the session is always in the future.
 
-    The board has not confirmed its settings, which are not repeated in a drive. The pacer must not
-    run again and again because of them.
+    The board has not confirmed its settings. The driver does not repeat settings during a drive, so
+    the pacer must not run again and again because of the settings.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)

@@ -58,9 +58,10 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
-    """The left short correction is right whenever settings were written, even on a bad line.
+    """The left short correction is right after each writing of the settings, even on a bad line.
 
-    The mode line sets the correction to almost 0. A single line that restored it was often lost.
+    The line that sets the mode also sets this correction to almost 0, and the driver restores it.
+    Bug: the driver sent only one line to restore it, and this line was often lost.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)

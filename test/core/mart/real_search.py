@@ -274,8 +274,8 @@ def search(trials: list[Trial]) -> list[tuple[Trial, str]]:
 def main() -> None:
     """Run all sets of trials, or only those that the command line names.
 
-    The names are ``pairs`` (of wishes), ``eights`` (sequences of eight) and ``beginnings`` (starts
-    of a driver).
+    The names are ``pairs`` (sequences of two wishes), ``eights`` (sequences of eight wishes) and
+    ``beginnings`` (starts of a driver).
     """
     for name in sys.argv[1:] or SETS:
         began_s = time.monotonic()

@@ -173,7 +173,8 @@ def test_a_refused_zero_command_ends_a_docking() -> None:
 def test_a_calibration_that_another_motion_prevents_names_the_other_program() -> None:
     """If another motion prevents a calibration, the result names another program as the cause.
 
-    The server refuses the check of the IMU before SB (gyro calibration).
+    Before SB (gyro calibration), the driver checks the IMU. The server refuses this check, because
+    another motion is in progress.
     """
     bench = MartBench().ready()
     real = bench.robot.receive

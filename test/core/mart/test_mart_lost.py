@@ -197,9 +197,9 @@ def test_the_e_stop_stops_a_robot_while_the_driver_asks_what_moves() -> None:
 
 
 def test_the_e_stop_repeats_the_stop_of_a_lost_server_at_once() -> None:
-    """After an e-stop, the driver repeats SRM at once to a server that hangs in SRM.
+    """A server hangs in SRM, the stop of a forward drive. After an e-stop, SRM is repeated at once.
 
-    Without an e-stop, it repeats SRM (stop of a forward drive) once a second.
+    Without an e-stop, the driver repeats SRM once a second.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.1, 2.5)

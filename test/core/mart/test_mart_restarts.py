@@ -288,7 +288,7 @@ def test_the_motors_are_switched_off_soon_after_a_restart_on_a_network_that_lose
 def test_a_short_restart_while_the_imu_is_checked_is_noticed(
     boot_s: float, firmware: Firmware
 ) -> None:
-    """The server restarts 0.08 s after RST IMU, and answers HELLO soon.
+    """The server restarts 0.08 s after the check of the IMU (RST IMU), and soon answers again.
 
     The silence is short, but the driver starts no motion before the server is ready.
     """

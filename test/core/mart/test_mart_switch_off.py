@@ -175,9 +175,10 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
 
 
 def test_four_lost_replies_on_a_poor_network_do_not_look_like_a_server_without_mcs() -> None:
-    """The network loses four exchanges of MCS in a row, and the replies to some queries.
+    """The network loses MCS (motor speeds) four times in a row, and some encoder queries.
 
-    The driver sends MCS once more, and then MSM. It does not report that the server has no MCS.
+    The driver sends MCS once more, and then MSM, which ends the direct control of the motors. It
+    does not report that the server has no MCS.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
