@@ -38,8 +38,8 @@ SILENCE_S: Final = 0.25
 the driver waits longer. A Stop that is damaged on the line may move the robot; the second proof
 shows that the last Stop did not move it."""
 BOTH_PROOFS_S: Final = 2.4
-"""Longest time for both proofs at shutdown together, in s. The guard needs the rest of
-``driver.LONGEST_END_S`` to repeat Stop."""
+"""Longest time in s for the two proofs together that the robot is at rest, at shutdown. The guard
+needs the remaining part of ``driver.LONGEST_END_S`` to repeat Stop."""
 
 T = TypeVar("T")
 

@@ -151,9 +151,9 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Motion that was lost before a reset of the odometry does not appear in odom.
+    """Displacements are lost, then the odometry is reset. Odom does not contain the lost motion.
 
-    The board's next pose, which comes after the reset, shows this motion.
+    The board's next pose comes after the reset, and contains the lost motion.
     """
     for seed in range(4):
         on = line(seed)

@@ -210,9 +210,9 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_a_reset_after_a_gap_leaves_no_wrong_heading(
     lost: int, use_board_pose: bool, frame: str
 ) -> None:
-    """After a gap at the end of a turn, and a reset, odom's motion has the right direction.
+    """The odometry is reset after a gap at the end of a turn. Then odom has the right direction.
 
-    The gap hides the robot's heading in the board's frame, until the next poses show it.
+    The gap hides the robot's heading in the board's frame, until the next poses show the heading.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
     attach(odometry, trip.pose)

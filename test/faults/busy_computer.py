@@ -40,7 +40,7 @@ If no frame equals the message, the message is wrong.
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    If this thread is delayed, it then delivers all bytes together that arrived during the delay.
+    After a delay of its thread, the terminal delivers all bytes together that arrived meanwhile.
 
     ``silent_s``: the longest time between two deliveries so far, in s.
     """

@@ -27,8 +27,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Least number of trials that end a drive, for each kind of receiver and rate of lost bytes.
 
-All scenes that end a drive have this number together. With 1 byte in 100 lost, each scene in
-``HURRIES`` has it alone.
+The number is the sum over all scenes that end a drive. With 1 byte in 100 lost, each scene in
+``HURRIES`` alone has this number of trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -55,9 +55,10 @@ Scores = dict[tuple[str, str, str], Score]
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield a name and a kind of board, for each kind on which a scene runs.
+    """Yield the kinds of board on which a scene runs, each with a name before it.
 
-    All kinds have the receiver ``receiver``. The scores of kinds with the same name are added.
+    All these boards have the receiver ``receiver``. The scores of boards with the same name are
+    added.
     """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):

@@ -143,14 +143,15 @@ class SteadySetpoint:
 class GoalSetpoint:
     """A pose to drive to.
 
-    * ``goal``, ``place``: the pose in the odometry frame, and in the board's earth frame.
+    * ``goal``, ``place``: the pose to drive to, in the odometry frame and in the board's earth
+      frame.
     * ``alignment``: ``Odometry.alignments`` at the time of the command; after a change, the goal is
       discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
-    * ``before``: the previous command. If it is a goal too, the smallest distance to it that the
-      robot has reached stays known, and grows by the distance between the two goals. So a
-      repetition of the goal changes nothing.
+    * ``before``: the previous command. If it is a goal too, the new goal takes over the smallest
+      distance to the previous goal that the robot has reached, plus the distance between the two
+      goals. So a repetition of the goal changes nothing.
     """
 
     authority: Final = Authority.POSE

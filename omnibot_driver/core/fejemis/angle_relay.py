@@ -38,7 +38,8 @@ class AngleRelay:
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
         """Return the ``fwl`` line with the angle, without a checksum.
 
-        ``sums``: whether the caller adds a checksum to the line.
+        ``sums``: whether the caller adds a checksum to the line. If not, the angle is rounded to
+        whole degrees.
         """
         wanted_deg = math.degrees(angle_rad) + self._owed_deg
         told_deg = max(-LARGEST_DEG, min(LARGEST_DEG, wanted_deg))

@@ -308,8 +308,8 @@ class FejemisBoard(Board):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the packets that the guard sends if the driver fails: without and with e-stop.
 
-        Both items contain Stop and switch brush and lift off. The second begins with the emergency
-        stop.
+        Each item contains Stop, and the commands that switch the brush and the lift off. The second
+        item begins with the emergency stop.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

@@ -100,8 +100,9 @@ class Half:
         self._left = False
         self._at: dict[str, float] = {}
         self._needed, self._needed_since, self._was_slow = 0, math.inf, False
-        """``_needed``: lines of the required stream since ``_needed_since`` (s; infinity before the
-        first check). ``_was_slow``: whether the last check found too few lines.
+        """``_needed``: number of lines of the required stream since the time ``_needed_since`` (in
+        s; infinity before the first check). ``_was_slow``: whether the last check found too few
+        lines.
         """
         self._next_at = -math.inf
         self._unsure_at: float | None = None

@@ -152,9 +152,9 @@ class WheelConfiguration:
 class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, in m.
 
-    The numbers are in the order of the line. The boards' help text says that the track is second,
-    but some boards report it first. ``digits``: for each number, the unit of its last digit in the
-    line; empty if unknown.
+    ``first_m``, ``second_m``: the first and the second number of the line. The boards' help text
+    says that the track is second, but some boards report it first. ``digits``: for each number, the
+    unit of its last digit in the line; empty if unknown.
     """
 
     first_m: float

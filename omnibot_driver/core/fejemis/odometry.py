@@ -48,9 +48,10 @@ MOVED_FRAME: Final = 2
 poses."""
 AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
-"""``AGAIN_M``, ``AGAIN_RAD``: tolerances in m and rad for the question whether the origin has moved
-again between two rejected poses. If it has, the motion between them differs from the wheels'
-motion, and the way from the origin to the second is at most as long as the wheels' motion.
+"""``AGAIN_M``, ``AGAIN_RAD``: tolerances in m and rad. With them, the driver finds out whether the
+origin has moved again between two rejected poses. If it has, the motion from the first to the
+second pose differs from the wheels' motion, and the way from the origin to the second pose is at
+most as long as the wheels' motion.
 """
 LONGEST_JUMP_S: Final = 0.2
 """Longest time in s since the last accepted pose in which rejected poses that contradict each other

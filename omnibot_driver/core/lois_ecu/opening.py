@@ -43,9 +43,9 @@ LONGEST_WAIT_S: Final = 0.5
 """Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
 may be due each time that a setting could be sent."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s, used in turn, from a tick report to the next round of settings, and from any report
-to a request for a date. A constant delay could always meet a report: the board cannot receive while
-it sends."""
+"""Delays in s, which the driver uses in turn. After a tick report, it waits for such a delay before
+it writes the next round of settings; after any report, before it requests a date. The board cannot
+receive while it sends: after a constant delay, every line could meet a report and be lost."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""

@@ -230,7 +230,8 @@ class MartBoard(Board):
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job; a JobDone with this ``token`` reports its result later.
 
-        Raises RequestRefused if another job is in progress, or if there may be no log to download.
+        Raises RequestRefused if another job is in progress, or if ``job`` is the download of a log
+        that the server may not have.
         """
         self._pilot.jobs.ask(job, token, now, *arguments)
 

@@ -62,10 +62,11 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
+        """Return the motor units for a turn at ``rate_radps``, corrected by the measured rate.
 
-        ``units``, ``seen_radps``: units of both motors, and measured rate, in the turn in progress.
-        The result takes them into account, but the driver does not learn from them.
+        ``units``, ``seen_radps``: the units of both motors, and the rate measured with them, in the
+        present turn on the spot. This measurement affects only the result: the driver does not
+        learn from it.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))

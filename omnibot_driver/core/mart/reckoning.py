@@ -42,10 +42,10 @@ The last measurement is the last encoder count or the last heading.
 FRESH_S: Final = 0.2
 """Age of the last heading, in s, up to which the measured turn rate is valid."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
-"""Assumptions about the end of a forward drive (RM) without a heading after the stop.
+"""Assumptions about the end of a forward drive (RM), if no heading has come after the stop.
 
-``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate in rad/s.
-``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
+``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate of the robot
+since the last heading, in rad/s. ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
 """
 
 

@@ -99,13 +99,13 @@ class SwitchOff:
     def missed(self, word: Word, *, disturbed: bool = False) -> bool:
         """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
 
-        After MOST_MISSES unanswered requests in a row, or MOST_MISSES_DISTURBED in a ``disturbed``
-        network, the request is not repeated, and motions are allowed again. If it was MCS, the
-        driver does not use MCS until the next connection, or until the motors may run on without a
-        motion (``doubt``).
+        After MOST_MISSES unanswered requests in a row (MOST_MISSES_DISTURBED in a ``disturbed``
+        network), the driver does not repeat the request, and allows motions again. If the last
+        request was MCS, the driver stops using MCS. It uses MCS again after the next connection, or
+        after a call of ``doubt``.
 
-        The server may execute an unanswered MCS later, and then refuses the next motion. If this
-        happens, the driver sends MSM, which ends the direct control by MCS.
+        The server may execute an unanswered MCS later. The server then refuses the next motion, and
+        the driver sends MSM, which ends the direct control by MCS.
         """
         self._misses += 1
         if self._misses < (MOST_MISSES_DISTURBED if disturbed else MOST_MISSES):

@@ -23,11 +23,11 @@ class Quirks:
       equal.
     * ``velocity_may_be_nan``: two ticks in one timer count give NaN or infinity in 0x20.
     * ``sign_of_command``: the measured speed has the sign of the target.
-    * ``duty_drags_target``: while a negative duty is commanded, each encoder tick lowers an RPM
-      target of 0 or less by 1. Requires ``ticks_of_forward_targets``.
-    * ``reverse_runs_fast``: while the controller's duty is negative, each encoder tick lowers an
-      RPM target of 0 or less by 1. The controller's next step uses the lower target, then restores
-      the target. Requires ``ticks_of_forward_targets``.
+    * ``duty_drags_target``: while a negative duty is commanded, and the RPM target is not positive,
+      each encoder tick lowers this target by 1. Requires ``ticks_of_forward_targets``.
+    * ``reverse_runs_fast``: while the controller's duty is negative, and the RPM target is not
+      positive, each encoder tick lowers this target by 1. The controller's next step uses the lower
+      target, then restores the target. Requires ``ticks_of_forward_targets``.
     * ``low_pass_starts_at_zero``: wheels ignore RPM targets until 0x23 is written.
     * ``extra_settings``: the settings 0x21 to 0x23 exist.
     * ``appends_odometry``: 0x12 sends the odometry after the ticks, with command number 0x12.
@@ -37,7 +37,8 @@ class Quirks:
     * ``button_waits_while_sending``: the button takes effect only after the current message or
       record.
     * ``odometry_period_is_fixed``: writing the period of 0x20 has no effect.
-    * ``terminal_mode_zeroes_correction``: 0x11 zeroes the left wheel's correction of short levels.
+    * ``terminal_mode_zeroes_correction``: the command of the terminal mode, 0x11, also sets the
+      left wheel's correction factor for short levels to zero.
     * ``terminal_mixes_sensors``: each terminal mode forwards both sensors, character by character.
     * ``reset_clears_ticks_only``: 0x18 keeps the odometry and the set-points.
     * ``terminal_passes_input_on``: in a terminal mode, input first goes to the sensor, at 9600 or

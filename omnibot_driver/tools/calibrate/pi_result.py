@@ -84,7 +84,7 @@ def result_of(
 ) -> Result:
     """Return the result, which the tool shows and saves.
 
-    ``parameters``: parameters that the tool has set in the driver. It also saves them in the file.
+    ``parameters``: the parameters that the tool sets in the driver, and saves in the file.
     """
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],

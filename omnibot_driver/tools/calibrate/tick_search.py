@@ -155,7 +155,8 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        In all later searches, a time with a missed mark spans two distances between marks.
+        In all later searches, the time between two ticks spans two distances between marks if the
+        board missed the mark between these ticks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):

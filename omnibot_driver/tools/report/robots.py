@@ -38,9 +38,9 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """Return the roles that a topic with this name may have.
 
-    With each role: the namespace of the topic's robot, and whether the topic fits the role. It must
-    have the right message type ``kind``. A topic such as ``~/state`` must also belong to a node in
-    ``drivers``.
+    With each role: the namespace of the topic's robot, and whether the topic fits the role. A topic
+    fits if ``kind``, its message type, is right for the role. A topic such as ``~/state`` must also
+    belong to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

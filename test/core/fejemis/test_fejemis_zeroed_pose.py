@@ -50,7 +50,8 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
     """The board's pose is set to zero during braking, and the next wheel speeds are lost.
 
-    The poses after it show the motion, so only the way to the first of them has an error.
+    The poses after the zero show the motion that follows. So the odometry has an error only in the
+    motion up to the first of these poses.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
@@ -117,10 +118,10 @@ def test_a_pose_set_to_zero_three_times_at_once_does_not_move_the_odometry() -> 
 
 @pytest.mark.parametrize("wait_s", [0.0, 0.02, 0.04, 0.06, 0.1])
 def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: float) -> None:
-    """With reads every 0.15 s, ``odom`` does not jump if another program sends ``enc0``.
+    """With reads every 0.15 s, ``odom`` does not jump if another program sets the pose to zero.
 
-    Regression: the first pose of a read had no wheel speeds, because the age of wheel speeds was
-    counted from their arrival.
+    Regression: the age of wheel speeds was counted from their arrival. So at the first pose of a
+    read, the last wheel speeds seemed too old.
     """
     bench = nominal()
     bench.drive_on(0.5, 0.3, 0.6)

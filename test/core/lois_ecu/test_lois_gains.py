@@ -131,7 +131,8 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
 def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
     """A setting that waited for the end of a drive is sent at least 15 ms after the Stop.
 
-    If the driver is called too seldom, it sends the setting half a second after the Stop.
+    If the writer is called only when the driver repeats Stop, every 50 ms, it sends the setting
+    half a second after the first Stop.
 
     Bug: a setting that had waited for more than half a second followed the Stop at once.
     """

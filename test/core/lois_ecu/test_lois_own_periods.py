@@ -19,7 +19,8 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.lois_ecu import Firmware
 
 STOP, STOP_RPM, LOW_PASS, ONE_DATE = ":0100000000", ":0200000000", ":233f800000", ":0f0000fffe"
-"""Beginnings of lines: Stop as duty 0/0, Stop as RPM 0/0, the low-pass 1.0, a request for a date.
+"""Beginnings of lines. ``STOP``: Stop as duty 0/0. ``STOP_RPM``: Stop as RPM 0/0. ``LOW_PASS``: the
+low-pass gain 1.0. ``ONE_DATE``: a request for one GPS date.
 """
 OWN_MS = 400
 

@@ -30,9 +30,9 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """From a speed of 20 RPM, three repetitions prove that a wheel is at rest; two do not.
+    """After a fall to 20 RPM, three more reports of 20 RPM prove that the wheel is at rest.
 
-    A wheel seldom stops from so high a speed.
+    Two reports do not prove it, because a wheel seldom stops from so high a speed.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0

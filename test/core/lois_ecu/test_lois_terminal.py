@@ -81,8 +81,8 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 ) -> None:
     """The driver reports once that a terminal mode has ended, even if the board misses some lines.
 
-    The driver also restores the left short correction, which the mode has overwritten. It is a
-    factor in the measurement of the left wheel's speed.
+    The terminal mode has overwritten the left short correction, a factor in the measurement of the
+    left wheel's speed. The driver restores this factor.
     """
     bench = Bench(firmware)
     configure(bench, GPS)

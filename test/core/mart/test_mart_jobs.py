@@ -21,7 +21,7 @@ def test_the_gyro_is_calibrated_at_rest() -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
-    """The IMU is dead. The job fails, and the driver does not send SB.
+    """The IMU is dead. The calibration fails, and the driver does not send its command SB.
 
     With a dead IMU, the server would not answer SB or any later command.
     """

@@ -146,8 +146,8 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
     After each move, the driver sends a stop, because the network may have delivered the move twice.
     A quick reply to this stop shows that no second run has begun.
 
-    ``copied``: whether the network duplicates the move. The first run is then added to the
-    odometry.
+    ``copied``: whether the network duplicates the move. If it does, the robot makes two runs, and
+    the driver adds the first run to the odometry.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""

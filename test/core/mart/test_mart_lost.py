@@ -69,7 +69,7 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     delay_s: float, seed: int
 ) -> None:
-    """A lost server is recognised, and not driven, although the network reorders its replies.
+    """The driver recognises a lost server, and refuses motion, although replies are reordered.
 
     When the IMU works again, the server answers all waiting requests at once.
     """
@@ -128,10 +128,10 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
-    """A server whose process stood still for 5 s while the robot was at rest is driven again.
+    """The server's process stands still for 5 s while the robot is at rest. Then it works again.
 
-    The server's answers to old queries are not taken for replies to stops. Such replies would show
-    that the stop port may hang.
+    Motion is accepted again. The driver does not take the server's late answers to old queries for
+    replies to stops, which would show that the stop port may hang.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

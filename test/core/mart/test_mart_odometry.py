@@ -287,7 +287,8 @@ def test_the_covariance_includes_a_change_that_is_carried_out_twice(
 ) -> None:
     """If a change of the motors' units arrives twice, the covariance covers the resulting turn.
 
-    The robot drives backward, so nothing measures the turn. Only the second answer shows the copy.
+    The robot drives backward, so nothing measures the turn. Only the server's second reply shows
+    that the change has arrived twice.
     """
     bench = MartBench("source").ready()
     inner, first = bench.robot.receive, []

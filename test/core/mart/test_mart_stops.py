@@ -243,7 +243,8 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 ) -> None:
     """On a good network, the robot has the speed of the next motion within 1.5 s.
 
-    "No motion" in reply to a second stop is not taken for a sign of a restart.
+    The driver may send a stop twice. It does not take the reply "no motion" to the second stop for
+    a sign that the server has restarted.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)

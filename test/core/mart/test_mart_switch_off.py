@@ -104,9 +104,9 @@ def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None
 
 
 def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
-    """A late copy of MCS does not prevent the next drive.
+    """A late copy of MCS (switch off the motors) does not prevent the next drive.
 
-    The server refuses motions after the copy, until the driver sends MSM.
+    After the copy, the server refuses motions until the driver sends MSM, which permits them again.
     """
     bench = creeping()
     since = len(bench.written)
@@ -126,7 +126,8 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
     """The driver sends MSM only when no late copy of MCS can arrive any more.
 
-    A copy of MCS after MSM would begin the direct control of the motors again.
+    MCS begins the direct control of the motors, and MSM ends the direct control. A copy of MCS
+    after MSM would begin it again.
     """
     bench = creeping()
     since = len(bench.written)

@@ -64,11 +64,11 @@ def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> 
 def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restart(
     uptime: int, ambiguous: bool
 ) -> None:
-    """A pose after a long gap is ambiguous if both counters fit a restart and also the old counts.
+    """A pose after a long gap is ambiguous if both counters fit a restart, but also a mere loss.
 
     The board sends ``uptime`` deltas, is silent for 2.1 s, and counts from zero again.
 
-    * 1228 deltas: ambiguous.
+    * 1228 deltas: by chance, both counters also fit a loss without a restart.
     * 1150 deltas: both counters show the restart.
     * 972 deltas: only the counter of the poses shows the restart.
     """
@@ -212,7 +212,8 @@ def reopened() -> Sequence:
 def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
     """The pose counter also shows a restart that happened while the port was closed.
 
-    By chance, the delta's count 0 fits the last count and the elapsed time.
+    The deltas' counter does not show it. By chance, its value 0 fits the last count and the elapsed
+    time.
     """
     sequence = reopened()
     after_s = 205 * 0.04 + 2.0

@@ -67,9 +67,9 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """Every twentieth read is late, so its lower bound is later than the tick's true time.
+    """Every twentieth read is late. It gives a lower bound later than the true time of the tick.
 
-    Such lower bounds do not make the fitted clock later.
+    These wrong lower bounds do not make the fitted clock later.
     """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(

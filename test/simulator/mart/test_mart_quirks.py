@@ -160,7 +160,8 @@ def empty_datagram_ends(quirks: Quirks) -> bool:
 def exit_is_silent(quirks: Quirks) -> bool:
     """Return whether the server does not answer EXIT, the command that ends the server.
 
-    A server with this quirk answers EXIT only after LOG. The function does not send LOG.
+    A server with this quirk answers EXIT only if LOG (begin a log) was sent before. This function
+    does not send LOG.
     """
     return Rig(quirks).ask("EXIT") is None
 

@@ -53,7 +53,10 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """After SS on the stop port has stopped a spin, SM works and reports the angle of the spin."""
+    """After the stop SS has ended a spin, the stop SM still reports the angle of the spin.
+
+    SS comes on the stop port, SM on the command port.
+    """
     rig = Rig()
     rig.drive("R")
     rig.stop("SS")
@@ -136,7 +139,7 @@ def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str
 
 
 def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
-    """SM comes on the command port. Directly after SM, SL comes on the stop port.
+    """The stop SM comes on the command port, and directly after it the stop SL on the stop port.
 
     The server still answers SM, but its stop port hangs.
     """
