@@ -38,7 +38,7 @@ SILENCE_S: Final = 0.25
 the driver waits longer. A Stop that is damaged on the line may move the robot; the second proof
 shows that the last Stop did not move it."""
 BOTH_PROOFS_S: Final = 2.4
-"""Longest time in s for the two proofs together that the robot is at rest, at shutdown. The guard
+"""Longest total time at shutdown, in s, for the two proofs that the robot is at rest. The guard
 needs the remaining part of ``driver.LONGEST_END_S`` to repeat Stop."""
 
 T = TypeVar("T")

@@ -10,8 +10,8 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds near the end of a minute. If the driver sends TIME (set the clock) in one of them, it
-sends the next full minute. The controller's clock is then at most 4 s fast.
+"""Seconds near the end of a minute. In these seconds, the driver sends TIME (set the clock) with
+the next full minute. The controller's clock is then at most 4 s fast.
 """
 
 

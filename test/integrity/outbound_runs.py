@@ -55,7 +55,7 @@ Scores = dict[tuple[str, str, str], Score]
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield the kinds of board on which a scene runs, each with a name before it.
+    """Yield the kinds of board on which a scene runs, as pairs of a name and a kind.
 
     All these boards have the receiver ``receiver``. The scores of boards with the same name are
     added.

@@ -33,10 +33,10 @@ The clock begins anew if at least ``AGAIN`` implausible board times in a row agr
 ``AGAIN_AFTER_S``.
 """
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s from the first to the last of the lines that seem early and are counted
-together.
+"""Longest time in s from the first to the last of three lines that make the clock begin anew.
 
-Three (``AGAIN``) such lines show that the clock began with a late line, so the clock begins anew.
+Three (``AGAIN``) lines that seem early, and whose times agree, show that the clock began with a
+late line.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""

@@ -39,7 +39,8 @@ class Done:
 
     A duplicate of the request may have started a second run of the same move.
 
-    * ``way_m``, ``turned_rad``: distance and turn by the encoder; of the second run alone, if any.
+    * ``way_m``, ``turned_rad``: distance and turn by the encoder. If there was a second run, they
+      are those of the second run alone.
     * ``lasted_s``: time in s from the request to the reply.
     * ``quiet_s``: longest possible duration of a second run, in s.
     * ``completed``: whether the server reported success, and no stop ended the move.

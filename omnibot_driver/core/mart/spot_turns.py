@@ -258,9 +258,9 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Undo what was learned from a slow turn if the next turn is fast.
 
-        A fast turn shows that something has held the robot in the slow turn. Call this method after
-        each turn, before the driver learns from this turn. After a slow turn, the method stores
-        what the driver knows, so that the next call can restore it.
+        A fast turn shows that something has held the robot in the slow turn. Call this method each
+        time before the driver learns from a turn. After a slow turn, the method stores what the
+        driver knows, so that the next call can restore it.
 
         ``part``: the turn's measured rate divided by its commanded rate.
         """

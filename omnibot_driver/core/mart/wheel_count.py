@@ -54,9 +54,9 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: 0, except while the network may have lost the start command: then the last reported
-    count. The network may have lost the command if this count differs by at most 1 from the last
-    count before the command.
+    ``maybe``: the last reported count while the network may have lost the start command, and 0 at
+    other times. The network may have lost the command if this count differs by at most 1 from the
+    last count before the command.
     """
 
     def __init__(self) -> None:

@@ -33,7 +33,7 @@ class CorrectionSmoother:
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
         """Move ``target`` by ``chord``, a correction in the axes of ``target``.
 
-        ``follow`` then moves ``pose`` to ``target`` within ``spread_s``. It takes longer if the
+        ``follow`` then moves ``pose`` to ``target`` within ``spread_s``, or more slowly if the
         robot could not move so fast.
         """
         self.target = self.target.moved(chord)

@@ -50,8 +50,8 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
     """The board's pose is set to zero during braking, and the next wheel speeds are lost.
 
-    The poses after the zero show the motion that follows. So the odometry has an error only in the
-    motion up to the first of these poses.
+    From then on, the poses show the motion. So the odometry has an error only in the motion up to
+    the first of these poses.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
