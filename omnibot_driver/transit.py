@@ -42,7 +42,7 @@ is ``CLOCK_RETREATS`` times the time by which it is early.
 ALIKE_S: Final = 0.02
 """Difference of misfits (``_Sender.misfit_s``) in s up to which two senders fit a message equally.
 
-The driver then assigns the message to the sender whose last message had the higher number.
+The driver then chooses the sender whose last message had the higher ``Arrival.number``.
 """
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
@@ -76,8 +76,9 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: possible times of sending, as time of day. The first is by our clock. While the
-      offset of the sender's clock is unknown, the second is the time by the sender's clock.
+    * ``sent_ns``: possible times, as time of day, at which the message was sent. The first time is
+      by our clock. The second time is by the sender's clock; it is left out when the offset of the
+      sender's clock is known.
     """
 
     total_s: float

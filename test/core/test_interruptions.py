@@ -90,8 +90,8 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
     """The board restarts in a pause, and the robot rests. Odom does not move to the new origin.
 
-    The board's frames are lost meanwhile. The first count that arrives exceeds the last count
-    before the restart.
+    The first frames of the restarted board are lost. So the first count that arrives is larger than
+    the last count before the restart.
     """
     on = line(0, frame=frame)
     on.drives = False

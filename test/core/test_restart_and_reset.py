@@ -111,12 +111,13 @@ def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_short_gap(
     ambiguous: bool, x_m: float
 ) -> None:
-    """A pose at the board's new origin also shows a restart in a short gap of 0.6 s.
+    """The robot drives 1.2 m. After a gap of 0.6 s, the board's pose is at the origin.
 
-    The counters of the board can mean a restart or a loss of frames. Odom adds only the assumed
-    motion in the gap. If the counters exclude a restart, the robot drove to the origin.
+    If the counters of the board can mean a restart (``ambiguous``), this pose shows a restart: odom
+    adds only the assumed motion in the gap. If the counters exclude a restart, the robot has driven
+    to the origin, and odom moves there.
 
-    Bug: odom moved to the board's old origin, if the robot could have driven there.
+    Bug: after a restart, odom moved to the board's old origin if the robot could have driven there.
     """
     odometry, estimates = driven(75, 0.016)
     for number in range(90, 140):

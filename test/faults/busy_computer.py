@@ -31,9 +31,9 @@ The board has sent these frames before the comparison, but the driver may publis
 comparison.
 """
 REACH: Final = 200
-"""Number of sent frames, after the last match, with which a published message is compared.
+"""Distance from the last match, in frames, below which sent frames are compared with a message.
 
-If no frame equals the message, the message is wrong.
+If none of these frames equals the published message, the message is wrong.
 """
 
 

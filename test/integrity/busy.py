@@ -40,8 +40,8 @@ SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""Range of the number of bytes after which the kind of the pieces changes. One kind is, for
-example, single bytes."""
+"""Range of the number of bytes after which the stream is cut into another kind of pieces, for
+example into single bytes."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:

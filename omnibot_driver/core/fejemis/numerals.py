@@ -14,8 +14,8 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: limits for the power of ten of a safe number's first digit. The power
-is at least ``SMALLEST``, and less than ``LARGEST``.
+"""``SMALLEST``, ``LARGEST``: powers of ten that limit the size of a safe number. The number is at
+least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``.
 """
 
 

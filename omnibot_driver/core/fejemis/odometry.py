@@ -14,8 +14,9 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects,
-if rounding of the pose can explain the difference.
+"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects.
+
+This applies to a difference that rounding of the pose can explain.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
@@ -88,13 +89,14 @@ class PoseOdometry:
         """How often in a row a rejected pose has agreed with the pose before it, which was
         rejected, too."""
         self._driven: Pose | None = None
-        """Motion from the last accepted pose to the last rejected one.
+        """Motion from the last accepted pose to the last rejected one, or None.
 
-        It is computed from wheel speeds. From one rejected pose to the next, these two poses give
-        it, except if the wheel speeds show that the frame may have moved again.
+        The motion to the first rejected pose is computed from wheel speeds. The motion from one
+        rejected pose to the next is the difference of the two poses. If the wheel speeds show that
+        the coordinate frame may have moved again, this motion is computed from the wheel speeds.
 
-        It is not None if the rejected poses may be in a new coordinate frame: the wheel speeds are
-        known for this whole time, and they contradict the first rejected pose.
+        If the value is not None, the rejected poses may be in a new coordinate frame: the wheel
+        speeds are known for this whole time, and they contradict the first rejected pose.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None

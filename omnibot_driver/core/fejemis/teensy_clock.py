@@ -190,8 +190,8 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``, or ``now`` if ``stamp_s`` is later.
 
-        A timestamp that is not later than the last one of the same kind is replaced: it is then
-        ``SMALLEST_STEP_S`` after that one.
+        The timestamps of one kind of reading rise by at least ``SMALLEST_STEP_S``: a timestamp that
+        is too early is raised.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

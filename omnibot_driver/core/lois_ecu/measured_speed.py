@@ -36,7 +36,7 @@ While the board sends, it notices ticks late, and computes no speed from some of
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
-    """Predict the last measured speed of each wheel, and the board's odometry (0x20).
+    """Predict the speeds of the wheels as last measured by the board, and its odometry (0x20).
 
     ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
     """

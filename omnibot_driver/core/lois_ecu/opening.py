@@ -256,10 +256,10 @@ class SettingsWriter:
 
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
-        Lines have a checksum or none (``checksum``). Another program may have set the board to the
-        form that the driver does not use, while the robot rolls. The board then ignores the
+        The driver sends lines with a checksum, or without one (``checksum``). Another program may
+        have set the board to the opposite while the robot rolls. The board then ignores the
         driver's usual Stops. So while the settings are unconfirmed, each of the first ``ROUNDS``
-        rounds begins with a Stop in the form that the driver does not use.
+        rounds begins with an opposite Stop: without a checksum, or with one.
         """
         if self._queue or not self._rounds_left:
             return

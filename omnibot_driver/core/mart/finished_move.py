@@ -24,7 +24,8 @@ The word SLOW in a request doubles the times per degree and inch; ``Done.slownes
 the robot.
 """
 LEAST_PACE: Final = 0.65
-"""Lowest mean speed in one run of a move, as a fraction of the usual speed in this move."""
+"""Lowest plausible mean speed in one run of a move, as a fraction of the usual speed in this move.
+"""
 FULL, TWO = 0.6, 1.25
 """``FULL``: shortest duration of one complete run of a move. ``TWO``: shortest duration of two
 complete runs. Both are fractions of the move's usual duration."""

@@ -139,9 +139,10 @@ class Move:
     def repeated(self) -> "Move":
         """Return the ``Move`` to continue with when the goal ``place`` is commanded again.
 
-        * The goal is in progress: it continues.
-        * The goal has failed: it begins anew.
-        * The goal was reached: another straight move only if it is now more than ENOUGH_M (m) away.
+        * If the goal is in progress, the drive to it continues.
+        * If the goal has failed, the drive to it begins anew.
+        * If the goal was reached, the robot makes another straight move only if the goal is now
+          more than ENOUGH_M (m) away.
         """
         if not self.given_up:
             return self

@@ -57,7 +57,8 @@ class SwitchOff:
     def doubt(self) -> None:
         """Record that a motor may be on, although the server knows of no motion.
 
-        MCS is then tried even if it was not answered before: the network may have lost the replies.
+        The driver then tries MCS (direct control of the motors), even if the server did not answer
+        MCS before: the network may have lost the replies.
         """
         self.needed = not self._refused
 

@@ -22,11 +22,11 @@ The ratio is above 1, because controllers overshoot, and users measure the board
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: speeds outside the hull, in m/s and rad/s, that are always
+"""``NOISE_MPS``, ``NOISE_RADPS``: deviation from the convex hull, in m/s and rad/s, that is always
 allowed.
 
-The encoders' resolution and rounding can cause such speeds. So can a slope, if the wheel
-controllers are slow.
+The encoders' resolution and rounding can cause such a deviation. A slope can also cause it if the
+wheel controllers are slow.
 """
 SIDEWAYS: Final = 0.1
 """Deviation from the set-points that is allowed in any direction.

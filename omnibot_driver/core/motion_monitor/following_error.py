@@ -19,7 +19,7 @@ RISING_S: Final = 0.16
 """Longest time in s that a robot needs to follow a set-point.
 
 A robot is assumed to be held if, in a displacement, it is clearly slower than all its recent
-set-points. These were in effect during the displacement, or in the ``RISING_S`` before it.
+set-points: those during the displacement, and those in the ``RISING_S`` before it.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01

@@ -66,8 +66,8 @@ class CorrectionSmoother:
 
         ``seconds``: duration of this step. The longer the step, the larger this part.
 
-        In each step, ``pose`` moves and turns at most as far as the robot could. ``move`` has
-        already used up a part of this distance and angle. The correction uses at most the rest.
+        In each step, ``pose`` moves and turns at most as far as the robot could. This limit is for
+        the sum of two motions: first the displacement in ``move``, then the correction.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

@@ -46,11 +46,11 @@ LAGS: Final = 60
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
 """Limit for the sum of the relative errors of two successive times between ticks. If the sum is
-above this limit, and the earlier error is above half of it, the board has missed a mark in the
-earlier time.
+above this limit, and the error of the first time is above half of this limit, the board has missed
+a mark in the first time.
 
-* Missed mark: the sum is about 1, or smaller if the board's clock loses up to 6 ms.
-* Mark noticed late: the sum is near 0.
+* If the board has missed a mark, the sum is about 1, or smaller if its clock loses up to 6 ms.
+* If the board has noticed a mark late, the sum is near 0.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record that are not searched for missed marks, because the

@@ -177,8 +177,8 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """After a Stop without RPM 0/0, a slower set-point than before does not start the wheels.
 
-    The firmware still uses the last measured speed, which is higher. Without feed-forward, the
-    wheels then get no power.
+    The firmware's speed controller still uses the last measured speed, which is higher than the
+    set-point. The controller has no feed-forward here, so it gives the wheels no power.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

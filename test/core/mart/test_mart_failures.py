@@ -76,7 +76,8 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 ) -> None:
     """If one or both motors are stuck, the driver switches both motors off.
 
-    Before this, the left wheel may turn the robot. The covariance covers this turn.
+    If only the right motor is stuck, the left wheel may turn the robot before the motors are off.
+    The covariance covers this turn.
     """
     bench = MartBench(firmware).ready()
     if driving:

@@ -303,9 +303,10 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """Even on a bad network, a turn of 1 degree stops the robot of a restarted server without MCS.
+    """A server without MCS (direct control) is restarted in a drive, and the motors still run.
 
-    The encoder counts that show the motion may come long after the stops.
+    A turn of 1 degree stops the robot. The network is bad, so the encoder counts that show the
+    motion may come long after the stops.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()

@@ -56,8 +56,8 @@ def trembling(random: Random) -> list[float]:
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
     """Return ``count`` noisy readings of an IMU at rest, with 1 g upward, and with ``leaps``.
 
-    ``leaps``: for the index of a reading, and the index of a value in this reading, the number that
-    is added to the value, in m/s² or rad/s.
+    ``leaps``: numbers that are added to the values, in m/s² or rad/s. The first key is the index of
+    a reading, the second key is the index of a value in this reading.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):

@@ -50,7 +50,7 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> None:
     """After a long gap, a pose that arrives before the next delta shows the losses, and no restart.
 
-    By chance, the pose's counter may also be possible after a restart.
+    In some cases, the pose has by chance a counter that a restarted board could also send.
     """
     sequence = counted(300)
     first = 300 + 5 * poses

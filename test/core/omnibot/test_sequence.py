@@ -108,10 +108,10 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 def test_a_restart_after_a_pause_is_doubtful_if_a_board_that_continued_lost_fewer_deltas(
     before: int, first: int, doubtful: bool
 ) -> None:
-    """If counts are missing after a pause, the board has restarted, or it has continued.
+    """The first count after a pause is the next count, or the driver assumes a restart.
 
-    The driver suspects a restart. The restart is doubtful if a board that continued would have lost
-    fewer deltas than a restarted one. The next count after the pause shows no restart.
+    The restart is doubtful if a board that continued would have lost fewer deltas than a restarted
+    one. If the first count is the next count, the board has not restarted.
     """
     sequence = begun(before - 10)
     for number in range(11):

@@ -116,8 +116,8 @@ def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_load
 ) -> None:
     """``eer`` and ``setid 0`` replace the calibrated offset of the gyro, so the yaw drifts.
 
-    ``eer`` loads the saved configuration, and ``setid 0`` erases the configuration. Before that,
-    ``gyroc`` has calibrated the gyro.
+    First, the command ``gyroc`` calibrates the gyro. Then ``eer`` loads the saved configuration, or
+    ``setid 0`` erases the configuration.
     """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
