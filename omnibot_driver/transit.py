@@ -19,10 +19,10 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, in a series of late messages.
+"""Longest pause, in s, between two late messages of one series.
 
-If a series lasts ``HEALS_AFTER_S`` (s), the sender's clock may have been set back, and its offset
-is estimated anew.
+If a series of late messages lasts ``HEALS_AFTER_S`` (s), the sender's clock may have been set back.
+The driver then estimates the offset of this clock anew.
 """
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP

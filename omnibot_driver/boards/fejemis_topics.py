@@ -274,8 +274,8 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason for a refusal, or an empty string.
 
-        ``off``: whether ``action`` switches a device off. It is then called in any state of the
-        boards, except in a replay, but a closed port gives a warning.
+        ``off``: whether ``action`` switches a device off. Such an action is called in any state of
+        the boards, except in a replay. If a port is closed, the method then returns a warning.
         """
 
         def say(session: Session, now: float) -> str:

@@ -230,7 +230,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether data from a running board need not be processed here.
+        """Whether this class can ignore data from a running board.
 
         This is so in the phase SETTLED, if no request is open and the wanted mode is not PAUSED.
         """

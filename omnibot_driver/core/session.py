@@ -212,7 +212,7 @@ class Session:
 
         If this method raises CommandRefused, the earlier command stays in effect.
 
-        ``by``: the topic that commands, if it is one that only this board has.
+        ``by``: the topic that commands the rates. It may be a topic that only this board has.
         """
         self._command(self._commanding.wheels(rates_radps, now, by=by), now)
 

@@ -4,9 +4,9 @@
 
 If a line is missing or blocked, the others still work. Missing lines are opened again.
 
-There is one exception: if another program uses the first line, and this line has not been open
-here, the others are given up too. So if two drivers wait for the same lines in the same order, one
-of them gets all lines.
+There is one exception: if another program uses the first line, and this transport has not opened
+the first line before, the transport gives up the other lines too. So if two drivers wait for the
+same lines in the same order, one of them gets all lines.
 """
 
 import select

@@ -49,9 +49,10 @@ class Interlocks:
         return LEAVING if self.leaving else self.missing
 
     def why_not_write(self) -> str:
-        """Return why a request that no data can confirm is refused; empty if it is allowed.
+        """Return the reason why a request is refused; empty if it is allowed.
 
-        Such a request is also refused in a replay, which writes nothing to a board.
+        This method is for requests that no data from the board can confirm. They are also refused
+        in a replay, which writes nothing to a board.
         """
         replay = "" if self.obeys else f"{REPLAY}; start the driver on the board's port"
         return self.why_not_request() or replay

@@ -21,9 +21,9 @@ JUMP_TICKS: Final = 3
 zero, that proves a reset. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count
-before a reset, of a robot at rest, that can prove the reset. The proof is that both counts are zero
-after the reset. Backlash changes a count by less."""
+"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count before a
+reset that can prove the reset of a robot at rest. For the proof, both counts must be zero after the
+reset. Backlash changes a count by less."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""

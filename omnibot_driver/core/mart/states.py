@@ -147,8 +147,8 @@ NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
 With a dead IMU, the server does not answer most of these commands: it starts the motors, or waits.
-Only MCR and MCL are answered, by a failure. Before this answer, some servers turn the robot for
-0.5 s.
+Only the controlled turns MCR and MCL are answered, by a failure. Before this answer, some servers
+turn the robot for 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})

@@ -73,8 +73,9 @@ class PendingDisplacements:
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Return the time in s without a report before the first displacement that waits here.
 
-        It is the number of lost displacements times the duration of this displacement. If this
-        duration is unknown, it is the time since ``last_stamp_s``, the stamp of the last report.
+        If the duration of this displacement is known, the time is this duration times the number of
+        displacements that were lost before it. Otherwise, the time is counted from
+        ``last_stamp_s``, the stamp of the last report; it is 0 if this stamp is None.
         """
         if not self._waiting:
             return 0.0

@@ -51,8 +51,8 @@ number is below 4096.
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The next read is late if it contains too many bytes for the time since the previous read: the board
-needs more than twice this time, plus ``BURST_S``, to send them.
+The next read is late if it contains too many bytes for the time since the previous read. There are
+too many bytes if the board needs more than twice this time, plus ``BURST_S``, to send the bytes.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2

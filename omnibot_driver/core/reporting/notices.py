@@ -125,10 +125,9 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """Return a notice as a list when the condition that it reports begins to hold.
+        """Return a list with the notice ``sentence`` if the reported condition has just begun.
 
-        Otherwise return an empty list. ``sentence``: the notice; empty while the condition does not
-        hold.
+        Otherwise return an empty list. ``sentence`` is empty while the condition does not hold.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []

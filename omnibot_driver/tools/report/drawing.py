@@ -21,7 +21,8 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""Largest number of points of a drawn line. Of a line with more points, only extremes are drawn."""
+"""Largest number of points of a drawn line. If the data has more points, only extremes are drawn.
+"""
 
 
 def new_figure(height_in: float) -> Figure:

@@ -53,9 +53,9 @@ def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> 
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """With the user's gains, twenty equal reports after a fall do not prove that a wheel rests.
+    """With the user's gains, twenty equal speeds after a fall of the speed do not prove rest.
 
-    Such a wheel may overshoot: its speed falls, and then stays constant.
+    The wheel may overshoot: its speed falls, and then stays constant.
     """
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of lines to a LOIS ECU while the robot drives: settings wait, the LED's line is sent."""
+"""Tests of lines to a LOIS ECU in a drive: the LED's line is sent, settings may have to wait."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure

@@ -40,9 +40,10 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
     """The left short correction keeps its value when settings are written during a drive.
 
-    This correction is a factor in the measurement of the left wheel's speed. Bug: the driver writes
-    the settings five times. The fifth time, it stopped after the mode line, which sets the
-    correction to almost 0.
+    This correction is a factor in the measurement of the left wheel's speed. The driver writes the
+    settings five times.
+
+    Bug: the fifth time, the driver ended with the mode line, which sets the correction to almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)

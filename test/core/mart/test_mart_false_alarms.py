@@ -116,7 +116,7 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
     """A move of a heavy robot that an obstacle ends early does not make a later move longer.
 
-    Only the reply to the next move reports the obstacle.
+    The server reports the obstacle only in its reply to the next move.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)

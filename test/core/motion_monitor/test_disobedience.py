@@ -222,7 +222,7 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
 def test_a_node_that_repeats_such_a_goal_does_not_set_the_robot_in_motion_again(
     jitter_m: float,
 ) -> None:
-    """A node repeats its goal ten times a second, and the robot drives away from it.
+    """A node repeats its goal ten times a second, but the robot drives away from the goal.
 
     The motion monitor trips as early as with a single goal. Then the repetitions are refused. This
     is also true if the goals differ a little, because the node computes each of them anew.

@@ -58,7 +58,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 @pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """A robot that does not obey is reported again if it has obeyed in between.
+    """If a robot has obeyed in between, the driver reports a second time that it does not obey.
 
     The line to the board is cut in the first and the third of three drives.
     """

@@ -92,7 +92,7 @@ def test_if_only_poses_arrive_they_show_the_present_motion() -> None:
 
 
 def test_a_pose_after_a_displacement_does_not_change_the_last_motion() -> None:
-    """A pose does not change the last motion if a displacement came after the previous pose.
+    """If a displacement came after the last pose, the next pose does not change the stored motion.
 
     The displacement shows the present motion better than the difference of the two poses.
     """

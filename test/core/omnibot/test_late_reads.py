@@ -95,7 +95,8 @@ def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
     """A reader that pauses once, after any byte of a frame, loses no frame.
 
-    Before the pause, it reads promptly for 0.5 s. The test tries places in five frames.
+    Before the pause, the reader reads promptly for 0.5 s. The test repeats this with the pause at
+    different bytes of five frames.
     """
     ticks = ticks_of(name)[: 62 + round(stop_s / TICK_S)]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -136,7 +137,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 ) -> None:
     """If each read is late, no frame is lost, whatever the frames contain.
 
-    The acceleration must be at least 1 g. Before, 24 equal frames are read in time.
+    First, 24 equal frames are read in time. In the late frames, the acceleration is at least 1 g.
     """
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24

@@ -108,9 +108,9 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
 ) -> None:
     """The board sends ``uptime`` deltas. In a gap of 12.4 s it restarts and sends 270 deltas.
 
-    The counter of the deltas wraps in the gap, and by chance it continues the old count. The next
-    pose shows the restart after 217 deltas. After 1241 deltas, the counter of this pose also
-    continues its old count, so the pose is ambiguous.
+    The counter of the deltas wraps in the gap, and by chance it continues the old count. If
+    ``uptime`` is 217, the counter of the next pose shows the restart. If ``uptime`` is 1241, the
+    counter of the pose also continues its old count, so the pose is ambiguous.
     """
     sequence = counted(uptime)
     for count in range(270, 275):

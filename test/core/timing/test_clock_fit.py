@@ -17,8 +17,8 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return the clock, and its error in s at the last tick.
 
-    ``above``, ``below``: functions that return the upper and the lower bound of a tick's time,
-    minus its true time, in s. The argument is the number of the tick.
+    ``above``, ``below``: functions of the number of a tick. They return the upper and the lower
+    bound of the tick's time, relative to the true time of the tick, in s.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
