@@ -104,8 +104,9 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line was lost or reopened, LinkError if all lines are missing, or
-        if another program uses the first line, which has not been open here.
+        Raises LinesChanged if a line was lost or reopened. Raises LinkError if all lines are
+        missing. Also raises LinkError if another program uses the first line, and this object has
+        never opened the line.
         """
         if not self._ready:
             if not self._changed:  # the guard process may still have a copy of a line just lost

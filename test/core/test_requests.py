@@ -102,7 +102,8 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
     """During a request, ``wake_at`` is later than now, so no thread wakes up without need.
 
-    ``wake_at`` is the time by which the session must act again. The board may also be silent.
+    ``wake_at`` is the time by which the session must act again. The test runs with a board that
+    sends data, and with a silent one.
     """
     bench = Bench()
     bench.speaks = speaks

@@ -51,8 +51,9 @@ class Encoder(Protocol):
 class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
-    * ``proof``: object to which each sent stop and motion is reported.
-    * ``heard``: called after each write, also of a request, with the packets and the time.
+    * ``proof``: object to which each sent stop and each sent motion is reported.
+    * ``heard``: function that is called with the packets and the time of each write. The packets of
+      requests are included.
     """
 
     def __init__(

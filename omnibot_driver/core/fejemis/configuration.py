@@ -56,8 +56,8 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers that the board reported last, by the keyword of their line. The same numbers in
-        the next report are confirmed.
+        """Numbers that the board reported last, by the keyword of their line. If the next report
+        has the same numbers, they are confirmed, and ``told`` gets them.
         """
         self._digits: dict[str, tuple[float, ...]] = {}
         """Unit of the last printed digit of each number, such as 0.001 for ``0.420``, by the

@@ -112,7 +112,8 @@ class Half:
     def unsure(self) -> bool:
         """Whether the board may have restarted and lost the user's settings.
 
-        True from a loss of the stream that driving requires until the next heartbeat.
+        It becomes True when the lines that driving requires are missing, and False when the next
+        heartbeat comes.
         """
         return self._unsure_at is not None
 

@@ -14,8 +14,9 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports that must arrive before the driver concludes, from an odometry report with
-its own command byte (0x20), that the board is of the manual's kind.
+"""Number of tick reports that must arrive before the driver can detect a board of the manual's kind.
+
+An odometry report with its own command byte (0x20) then shows this kind.
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no

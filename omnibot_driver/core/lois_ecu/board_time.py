@@ -137,7 +137,10 @@ def _above_line(kept: Sequence[Point]) -> list[float]:
 
 
 def _line_below(kept: Sequence[Point]) -> Point:
-    """Return slope and height of a straight line that touches a point and has no point below it."""
+    """Return slope and height (at time 0) of a straight line below the points.
+
+    The line touches at least one point. All other points lie on the line or above it.
+    """
     half = len(kept) // 2
     points = list(kept)
     # A read may be late but never early, so the line lies below all arrivals. Its slope is that

@@ -40,8 +40,9 @@ NO_TICKS_ADVICE: Final = (
     "the board sends other reports, but no ticks, so there is no odometry, and a stop cannot be"
     " confirmed; set `ticks_period`"
 )
-"""Advice if other reports came for ``NO_TICKS_S``, but no ticks. Of the time between two reports,
-at most ``LONGEST_STEP_S`` counts.
+"""Advice if other reports came for ``NO_TICKS_S`` (in s), but no ticks.
+
+A longer time than ``LONGEST_STEP_S`` (in s) between two reports is counted as ``LONGEST_STEP_S``.
 """
 LOOK_AT: Final = 600
 """Number of received bytes without a valid line after which the user gets advice. The board sends

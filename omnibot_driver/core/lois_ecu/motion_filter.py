@@ -60,8 +60,8 @@ EXCESS_CHANGE: Final = (0.0, 0.15)
 """Standard deviation that is added to a wheel's excess when its set-point changes.
 
 The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
-``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess. The first values are
-for the board's own controller gains, the second ones for the user's.
+``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess. In each of the three
+constants, the first value is for the board's own controller gains, the second for the user's gains.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLS_S: Final = 0.1
@@ -287,8 +287,8 @@ class MotionFilter:
     def _begin_biases(self, wheels: Sequence[int]) -> None:
         """Reset the speed errors (biases) of these wheels, whose kind of command has changed.
 
-        A bias is a relative error in duty mode, otherwise the amount in m/s by which the firmware
-        rounds down a speed.
+        In duty mode, a bias is a relative error. In other modes, a bias is the amount in m/s by
+        which the firmware rounds down a speed.
         """
         assert self._kinds is not None
         for index in wheels:

@@ -52,8 +52,8 @@ fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
 TICKS_DUE_S: Final = 1.5
-"""Time in s without ticks after which the rounds no longer wait for ticks before they write the
-period of the ticks again."""
+"""Time in s since the last ticks. Before a round writes the period of the ticks again, it waits for
+ticks. After this time without ticks, it no longer waits."""
 FAST_TICKS_MS: Final = 200
 """Longest period of the ticks in ms that each of the first ``ROUNDS`` rounds writes. Each write
 begins a period anew, but with so short a period, these rounds keep the ticks away for less than
@@ -240,9 +240,11 @@ class SettingsWriter:
     def _encoded(self, command: Command) -> bytes:
         """Return the line of ``command``. The user's setting decides whether it has a checksum.
 
-        While the settings are unconfirmed, a mode gets two lines, the first one with a checksum: a
-        board that has just booted obeys no other line. A Stop gets only the form that the user's
-        setting does not select (see ``_begin_round``).
+        Two commands are exceptions:
+
+        * A terminal mode gets two lines while the settings are unconfirmed. The first line has a
+          checksum: a board that has just booted obeys only lines with a checksum.
+        * Stop has a checksum only if the user's setting is to send none (see ``_begin_round``).
         """
         if command == outbound.STOP:
             return encode_command(command, with_sum=not self.settings.with_sum)

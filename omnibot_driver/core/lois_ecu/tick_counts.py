@@ -157,9 +157,10 @@ class TickCounts:
 
         The result is False in two cases:
 
-        * The counts are larger than a wheel can roll in ``duration_s``.
-        * The clock counts ns, the board counts the ticks of both wheels, and the expected motion
-          explains the counts.
+        * A count is larger than the number of ticks that a wheel can roll in ``duration_s``.
+        * The expected motion explains the counts, and a wheel can roll back that far in
+          ``duration_s``. This case requires that the clock counts ns, that the board counts the
+          ticks of both wheels, and that ``duration_s`` is at most ``SILENT_S``.
 
         ``fallen``: the larger one of the two counts' decreases, in ticks.
         """
@@ -173,10 +174,11 @@ class TickCounts:
         return self._odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start, if it started after the previous report.
+        """Return the time in s since the board's start, by the board's clock.
 
-        None if the report does not show this: the unit of the board's clock is unknown, a clock in
-        ns may have wrapped (every 4.3 s), or it shows an earlier start.
+        None if the unit of the clock is unknown. A clock in ns wraps every 4.3 s. So with a clock
+        in ns, the result is also None if this clock may have wrapped since the previous report, or
+        if it shows a start before the previous report.
 
         ``duration_s``: time in s since the previous report.
         """

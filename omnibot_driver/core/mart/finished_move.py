@@ -13,9 +13,9 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""Smallest distance or turn that is measured in a complete move, as a fraction.
+"""Smallest distance or turn that is measured in a complete move, divided by the target.
 
-It is a fraction of the requested or the expected distance or turn, whichever is smaller.
+The target is the requested or the expected distance or turn, whichever is smaller.
 """
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.

@@ -59,17 +59,17 @@ NO_HEADING: Final = (
     " the odometry is uncertain: check the network and the server"
 )
 PRESENT_S: Final = 0.35
-"""Longest time without a reply in which the server cannot have been restarted.
+"""Part, in s, of the longest silence in which the server cannot have been restarted.
 
-The time is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
+The other part of this silence is ABSENT_TRIPS times the average duration of a query.
 """
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
 """Limits in s for a short silence of a server at rest, in which it may have been restarted.
 
-``GAP_S``: shortest such silence; twice the average duration of a query is added.
+``GAP_S``: the silence lasts longer than this time plus twice the average duration of a query.
 
-``GAP_LONGEST_S``: longest wait for a heading after such a silence. A heading of exactly zero shows
-a restart.
+``GAP_LONGEST_S``: the driver waits at most this time for a heading after such a silence. A heading
+of exactly zero shows a restart.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.

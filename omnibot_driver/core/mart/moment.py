@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Limit in s for ``Moment.spread_s``. From this value on, the time of the value in a reply is
+"""Limit in s for ``Moment.spread_s``. If the spread is at least as large as this limit, the time is
 regarded as uncertain."""
 
 

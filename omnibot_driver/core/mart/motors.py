@@ -24,7 +24,8 @@ Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Smallest number of motor units for which the ratio of the two motors' speeds is computed.
 
-Below it, the driver uses the ratio at ``BALANCE_UNITS``, which is more exact.
+For fewer units, the driver uses the ratio at ``BALANCE_UNITS``: a ratio that is computed for fewer
+units would be less exact.
 """
 
 
@@ -107,7 +108,7 @@ class Motors:
         return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
     def _mean_speed(self, units: float) -> float:
-        """Return the mean speed of both motors if both have these motor units.
+        """Return the mean speed of both motors when each motor has ``units`` motor units.
 
         The speed is in nominal units, and at least 0.
         """

@@ -151,9 +151,10 @@ class RelativeHeading:
     def doubt_rad(self, angle_rad: float, at_s: float) -> float:
         """Return the standard deviation, in rad, of the turn since the last heading.
 
-        It is zero unless the server may have restarted. After a restart, the heading is zero, or on
-        some servers the turn since the restart. So a heading near zero may be a turn, or have
-        another zero point. It is infinite if the heading certainly begins anew.
+        The result is zero unless the server may have restarted. A server that has restarted reports
+        a heading of zero, or on some servers the turn since the restart. So a heading near zero may
+        show a turn or a new zero point. If it certainly shows a new zero point, the result is
+        infinite.
         """
         before_rad = self._angle_rad
         if not self.may_begin_anew or before_rad is None or at_s <= self.told_s:

@@ -132,7 +132,7 @@ class SpeedLoop(Motors):
         """Return the units with which RM (forward) starts both motors.
 
         The slower wheel determines the units, from LEAST_UNITS to 60. After a start that turned no
-        motor, they can be higher than this wheel needs.
+        motor, the units can be higher than the slower wheel needs.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))

@@ -77,8 +77,8 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    * ``units``: motor units of the last turn, or those that SSP has set for the next one; 0 at the
-      beginning of a connection.
+    * ``units``: motor units of the last turn, or those that SSP (the command for the speed of
+      turns) has set for the next turn; 0 at the beginning of a connection.
     * ``seen_radps``: measured rate of the last turn, in rad/s.
     * ``settings``: may be replaced.
     """

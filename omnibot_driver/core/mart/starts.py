@@ -109,10 +109,11 @@ class Starts(FailedStarts):
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _switch_motors_off(self, now: float) -> Packets:
-        """Return the next request that switches off the motors. No packets while it must wait.
+        """Return the next request that switches off the motors; no packets while it must wait.
 
-        MCS stops both motors; MSM ends the effect of MCS. Both wait until no late reply can be
-        mistaken for their own. MSM also waits until no duplicate of MCS can arrive after MSM.
+        MCS stops both motors; MSM ends the effect of MCS. Each of these requests waits until no
+        late reply can be mistaken for the reply to it. MSM also waits until no duplicate of MCS can
+        arrive after MSM.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -137,9 +138,10 @@ class Starts(FailedStarts):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether ``start`` must wait, because an earlier HELLO may arrive after it.
 
-        Only a controlled move waits: the answer to this HELLO would falsely exclude a duplicate of
-        the move. The wait ends after ``NAME_WAIT_S``. After a fresh check of the IMU, there is no
-        wait, because the driver has already waited before the check.
+        Only a controlled move waits. An answer to HELLO after the move shows the driver that no
+        duplicate of the move is running. The answer to an earlier HELLO could show this falsely.
+        The wait ends after ``NAME_WAIT_S``. After a fresh check of the IMU, there is no wait,
+        because the driver has already waited before the check.
         """
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False

@@ -140,10 +140,10 @@ class Stopping:
         return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
-        """Return whether to send HELLO too, because the reply to the controlled move may be lost.
+        """Return whether to send HELLO together with the stop of a controlled move.
 
-        The server answers HELLO only after the end of the move. So the answer shows that the move
-        has ended.
+        The reply to the move may be lost. The server answers HELLO only after the end of the move,
+        so this answer shows that the move has ended.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 

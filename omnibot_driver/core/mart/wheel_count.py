@@ -14,10 +14,10 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest accepted error of a count whose reply may belong to another query.
+"""Terms of the largest accepted error of a count whose reply may belong to another query.
 
-It is DOUBT_M (m) + DOUBT_MPS (m/s) * time. The time is the sum of two times: the driving time since
-the last count, and the time uncertainty of the reply.
+This error is DOUBT_M + DOUBT_MPS * (a + b), in m. Here ``a`` is the driving time in s since the
+last count, and ``b`` is the uncertainty in s of the time of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time between them.

@@ -92,7 +92,7 @@ The cost is low, because a shock lasts several frames.
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
-"""Cost of an acceleration below 0.5 g if one of its words has the bytes of an IMU header.
+"""Cost of an acceleration below 0.5 g that contains a word with the bytes of an IMU header.
 
 Such a frame is probably misread: what looks like its header is a gyro value of -6 of another frame.
 """

@@ -309,8 +309,8 @@ class FrameDecoder:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
         A frame is decided if later bytes cannot change the decision. A frame that ends at the
-        position ``until`` or before is decided without waiting for later bytes. If the line has
-        carried exactly one frame and is closed, this frame is accepted if its content is usual.
+        position ``until`` or before is decided without waiting for later bytes. When the line is
+        closed and has carried only one frame, this frame is accepted if its content is usual.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

@@ -23,8 +23,8 @@ class Cycle:
     """A repeating sequence of frame kinds.
 
     ``after[kind][at]``: the new position in the sequence when the position is ``at`` and a frame of
-    ``kind`` arrives. It is directly after the next place for this kind, and frames that were due
-    before this place are regarded as lost.
+    ``kind`` arrives. The new position is directly after the next place for this kind. Frames that
+    were due before this place are regarded as lost.
     """
 
     def __init__(self, *kinds: Kind) -> None:

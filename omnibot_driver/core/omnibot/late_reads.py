@@ -2,10 +2,10 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-* The line was idle. If the pause is within a supposed frame, bytes were lost there: the beginning
-  and the end of the supposed frame come from different ticks. All later frames then seem late by
+* The line was idle. A pause within a supposed frame then means that bytes were lost: the beginning
+  and the end of the supposed frame come from different ticks. All later frames seem late by
   whole ticks.
-* Only the reader was late. Later frames are then on time again.
+* Only the reader was late. The frames after the pause are on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
 contains, or which frames are accepted.

@@ -24,10 +24,11 @@ adapter that delivers bytes every 10 ms has a mean delay of 5 ms, and is just no
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
-"""Time in s after which an arrival time no longer affects the estimated difference of the clocks'
-rates.
+"""Time in s for which the estimated difference of the clocks' rates must be too large before it is
+reported.
 
-A difference that lasts for a shorter time may come from a busy computer, so it is not reported.
+After this time, the earlier arrival times no longer affect the estimate. A difference that lasts
+for a shorter time may come from a busy computer.
 """
 
 BUSY_SHARE: Final = 0.1

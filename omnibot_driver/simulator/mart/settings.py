@@ -14,7 +14,8 @@ from typing import Literal
 class Quirks:
     """Deviations of the public server from its manual. By default, all are off.
 
-    The last four were found in the public source, not on the running server.
+    ``heading_in_reference_moves_only`` and the three deviations after it were found in the public
+    source, not on the running server.
 
     * ``stop_port_keeps_motion``: SL stops F, B and RM, but later motions are refused, and a later
       SM or SRM hangs the command port.

@@ -81,13 +81,13 @@ def answer(
 ) -> Array:
     """Return the speed of a wheel, in RPM, after a step of the set-point from standstill.
 
-    The first dimension is time, in steps of 1 ms. The other dimensions are the common shape of the
-    gains, ``dead_s``, ``begun`` and ``sent_s``.
+    The first dimension of the result is time, in steps of 1 ms. The other dimensions are the common
+    shape of the gains, ``dead_s``, ``begun`` and ``sent_s``.
 
-    * ``dead_s``: replaces the dead time of ``loop``.
+    * ``dead_s``: dead time in s; None: that of ``loop``.
     * ``begun``: initial position of the wheel between two encoder ticks, 0 to 1.
-    * ``sent_s``: time at which the board first sends its tick counts; while it sends, it notices
-      encoder ticks late. None: it never sends.
+    * ``sent_s``: time in s at which the board first sends its tick counts; None: it never sends.
+      While the board sends, it notices encoder ticks late.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(

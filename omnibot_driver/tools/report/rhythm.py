@@ -118,8 +118,8 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the index after the last step that can compensate it.
 
-    Such a step comes before the next long step, and is among the ``most`` steps from the long step
-    on. ``wide``: indices of the long steps.
+    Only steps before the next long step can compensate a long step. ``most``: largest number of
+    steps to consider, counted from the long step itself. ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

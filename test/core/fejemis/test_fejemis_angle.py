@@ -97,7 +97,8 @@ def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
 def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
     """A late read does not hide that the front board is silent.
 
-    A refusal names the computer at first, and the front board after the first read in time.
+    While the driver reads late, a refusal names the computer as the cause. As soon as a read is in
+    time, a refusal names the front board.
     """
     bench = nominal()
     bench.run(0.1)

@@ -48,8 +48,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: the other lines come only with samples of odd numbers (True) or of even numbers
-    (False).
+    ``odd``: the gyro line and the acceleration line come with each sample. All other lines come
+    only with samples of odd numbers (True) or of even numbers (False).
     """
 
     order: str

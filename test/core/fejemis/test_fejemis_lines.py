@@ -332,10 +332,10 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """In each window of 24 lines of a kind, the decoder counts the lines whose form differs.
+    """In each window of 24 lines of a kind, the decoder counts the lines of an unusual form.
 
     The first seven such lines in a window are discarded as damaged; the eighth is accepted.
-    ``windows``: number of earlier windows in which no form differs.
+    ``windows``: number of earlier windows without a line of an unusual form.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

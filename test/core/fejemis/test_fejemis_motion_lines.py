@@ -174,7 +174,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     "volts", [6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25, 1.99, 1.999, -0.1995, -0.1999]
 )
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """A lift line loses one or two characters. It then drives the lift no harder and no longer.
+    """A lift line loses one or two characters. Its voltage and its duration do not increase.
 
     The complete line commands 45 to 100 % of the requested voltage.
     """

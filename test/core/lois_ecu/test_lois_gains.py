@@ -159,7 +159,8 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
     """The driver also sends Stop without a checksum, but never in one write with a setting.
 
-    If both lines lost characters, the rest could command full duty.
+    If Stop and the setting lost characters in one write, the remaining characters could command
+    full duty.
     """
     writer = SettingsWriter(HOST_GAINS, SetPoints(HOST_GAINS))
     writer.begin(0.0)

@@ -133,7 +133,8 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     """After a missing reply to a sonar query, the next sonar query waits: the reply may still come.
 
-    ENC (encoder query) is sent at once, but its reply is doubtful.
+    ENC (encoder query) is sent at once. The reply to ENC is regarded as doubtful, because it may be
+    the missing reply.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)

@@ -279,9 +279,10 @@ def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
 
 
 def test_a_server_that_ends_without_a_file_has_not_sent_its_log() -> None:
-    """The server keeps no log any more, and answers EXIT with a bare ``ok``.
+    """The server keeps no log any more, so it answers the download of the log with a bare ``ok``.
 
-    The download fails, and its result says that the server has ended.
+    EXIT downloads the log, and ends the server. The download fails, and its result says that the
+    server has ended.
     """
     bench = MartBench("documented").ready()
     assert bench.job(Job.LOG).success

@@ -108,10 +108,10 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """A late copy of a rejected RM (forward drive) moves the robot. Motion is still allowed later.
+    """A late copy of a rejected RM (forward drive) moves the robot, and the network loses replies.
 
-    The driver stops this motion, and does not regard the server as defective. The network loses
-    replies, too.
+    The driver stops this motion. It does not regard the server as defective, so it allows motion
+    later.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

@@ -50,8 +50,9 @@ def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed
 def test_a_goal_that_another_cause_ends_is_noticed() -> None:
     """The e-stop ends a goal: the driver does not report "over", and gives no notice of the goal.
 
-    ``reach`` returns nevertheless, as soon as the session has dropped the goal. Regression: a
-    measurement of many goals was aborted after a goal that the driver ended because of a push.
+    The tests' function ``reach`` waits for the end of a goal. It returns as soon as the session has
+    dropped the goal. Regression: the driver ended a goal because of a push, and this aborted a
+    measurement of many goals.
     """
     bench = MartBench("source").ready()
 

@@ -134,8 +134,9 @@ def test_motors_that_run_on_after_a_controlled_move_are_switched_off_before_the_
 def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_s: float) -> None:
     """The server restarts within 50 ms in a turn, so that no reply is missing.
 
-    The driver does not notice it. VOLTS would crash the server, with the motors on. So the driver
-    sends no VOLTS in turns on the spot, which do not need the voltage.
+    So the driver does not notice the restart. VOLTS (voltage query) would crash the server, and the
+    motors would stay on. The driver sends no VOLTS in turns on the spot, because it does not need
+    the voltage there.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 2.0)

@@ -221,9 +221,10 @@ def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply:
 
 
 def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
-    """The driver ends the direct control of the motors even if MCS seemed to be unknown.
+    """The driver ends MCS (direct control of the motors) even if the server seemed to reject MCS.
 
-    A late reply to another command, "not supported", seemed to be the reply to MCS.
+    The server obeys MCS, but the late reply to another command, "not supported", looks like the
+    reply to MCS.
     """
     bench = creeping()
     network = bench.robot.network[0]

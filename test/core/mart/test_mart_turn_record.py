@@ -180,7 +180,8 @@ def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -
 def test_the_record_of_an_earlier_turn_is_not_used() -> None:
     """The driver does not use the record of an earlier turn with the same target angle.
 
-    LAST TURN sends such a record if the server could not record the new turn.
+    The server sends such a record in reply to LAST TURN (download of the record) if it could not
+    record the new turn.
     """
     bench = MartBench("source").ready()
     for yaw_rad in (math.pi / 2, math.pi, -math.pi / 2, 0.0):

@@ -2,7 +2,8 @@
 
 """Tests that an IMU frame is returned as soon as the packet with its last byte arrives.
 
-If this byte looks like the beginning of another frame, the decoder decides by the arrival times.
+The last byte may look like the beginning of the next frame. The decoder then decides by the arrival
+times to which frame the byte belongs.
 """
 
 from collections.abc import Callable, Iterator
