@@ -23,8 +23,8 @@ JOIN_TIMEOUT_S: Final = 1.0
 SHORTEST_STEP_S: Final = 0.001
 """Shortest time between two calls of ``Session.tick``, in s, even if the session asks for less."""
 LONGEST_PAUSE_S: Final = 10.0
-"""Longest part of a pause that is played, in s. After this time, the session has noticed the
-silence and does not change."""
+"""Longest part of a pause that is played, in s. By the end of this time, the session has noticed
+the silence, and its state no longer changes."""
 
 T = TypeVar("T")
 

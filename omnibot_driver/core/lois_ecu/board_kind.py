@@ -14,7 +14,7 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports that must arrive before the driver can detect a board of the manual's kind.
+"""Number of tick reports that must arrive before the driver can detect the manual's kind of board.
 
 An odometry report with its own command byte (0x20) then shows this kind.
 """

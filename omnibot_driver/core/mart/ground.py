@@ -46,9 +46,9 @@ VOLTS and most motion commands crash a server that starts up. If RM (forward dri
 server, the motors stay on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Time without a reply after which the driver regards the server as absent.
+"""Terms of the silence in s after which the driver regards the server as absent.
 
-The time is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
+This silence is ABSENT_S plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
 """Largest number of unanswered HELLO queries for which the driver still expects answers. If more

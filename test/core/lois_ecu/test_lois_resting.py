@@ -41,7 +41,7 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
-    """After a fall to 28 RPM, many repetitions prove that the wheel is at rest.
+    """The reported speed falls to 28 RPM. Many equal reports prove that the wheel is at rest.
 
     No rolling wheel is that steady. The board has measured the 28 RPM wrongly: a wheel does not
     stop directly from such a speed.

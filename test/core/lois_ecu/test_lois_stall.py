@@ -101,7 +101,8 @@ def looks_stalled(
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
     """A wheel whose reported speed never changes while the other wheel ticks looks stalled.
 
-    The firmware's pose changes too, but it is computed from the old speed.
+    The firmware's pose does not show that this wheel turns: the firmware computes the pose from the
+    old speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])

@@ -192,9 +192,9 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """Parts of two frames are rejected if a pause is between them.
+    """The beginning of one frame and the end of another have the length of one frame.
 
-    Together, the parts have the length of one frame.
+    The decoder rejects these parts, because a pause is between them.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
