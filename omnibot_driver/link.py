@@ -28,8 +28,8 @@ JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s. The reader thread itself waits up to 2.5 s for the guard,
 and then kills the guard."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest. For a slow board, the
-driver waits longer."""
+"""Limit, in s, for the wait at shutdown for a proof that the robot is at rest. For a slow board,
+the limit is larger."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard can repeat
 Stop after the shutdown."""

@@ -13,7 +13,9 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of repeated measurements, alternately of driver and floor.
+    """The results of repeated measurements, alternately of the driver and of the floor.
+
+    The floor is the smallest program with the same output.
 
     ``ours``, ``floor``: the values of driver and floor, in pairs.
 

@@ -135,9 +135,9 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip the next writes that arrive undamaged and change nothing, except the last of them.
+        """Skip a row of writes that arrive undamaged and change nothing, but not its last write.
 
-        The skipped writes count as arrived. The last one goes over the line as usual.
+        The skipped writes count as arrived. The last write goes over the line as usual.
         """
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1

@@ -57,8 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        If the board has no ~/start, the release ends a refusal that began with the monitor's second
-        stop within 60 s. In all other cases, the release changes nothing.
+        If the board has no ~/start, the release allows motion again after the monitor's second stop
+        within 60 s. In all other cases, the release changes nothing.
         """
         if self.until is Until.ESTOP:
             self.start()

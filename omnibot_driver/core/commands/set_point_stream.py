@@ -104,8 +104,8 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written.
 
-        A motion in effect is then sent again at once: Stop has ended the motion, or the packets may
-        have completed a damaged motion frame.
+        If a motion is in effect, its set-point is then sent again at once. The packets may contain
+        Stop, which has ended the motion, or may have completed a damaged motion frame.
         """
         if self._heard is not None:
             self._heard(packets, now)

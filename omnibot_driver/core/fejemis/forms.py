@@ -11,8 +11,10 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``: limit for lines with a correct checksum; ``VARIES_WITHOUT_SUM``: for other lines. If
-at least this many of 24 lines of one kind differ from the learnt form, it is no longer checked.
+"""Number of lines, among 24 of one kind, that differ from the learnt form when its check ends.
+
+Afterwards, every form of this kind is accepted. ``VARIES``: for lines with a correct checksum;
+``VARIES_WITHOUT_SUM``: for other lines.
 """
 OF: Final = 24
 

@@ -106,8 +106,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        The first angle is always reachable. A later one must be near the last accepted angle, or
-        near the angle directly before it, if that angle was rejected.
+        The first angle is always reachable. Each later angle must be near the last accepted angle,
+        or near a rejected angle that came directly before.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -124,10 +124,10 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_new = self._speeds, speeds, True
 
     def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
-        """Return the displacement from the previous pose in a list; empty if there is none.
+        """Return a list with the displacement from the previous pose; empty if there is none.
 
-        Every 0.2 s and in a new coordinate frame, the list also contains a PoseReading: the first
-        pose of the frame, plus all displacements returned since then.
+        Every 0.2 s, and when a new coordinate frame begins, the list also contains a PoseReading.
+        It is the sum of the first pose of the frame and all displacements returned since then.
         """
         displacement = self.pose(pose)
         if displacement is None:

@@ -41,8 +41,8 @@ ALONG_VARIANCE: Final = 0.15
 """
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Difference, in ticks, between a reported and an expected count, above which the wheel does not
-keep its speed. The filter then allows for larger changes of the speed.
+"""Difference, in ticks, between a reported and an expected count, above which the filter assumes
+that the wheel's speed has changed. The filter then allows for larger changes of the speed.
 """
 UNFORESEEN: Final = 5.0
 """Difference, in standard deviations, between a reported and an expected count, that the motion of
@@ -70,9 +70,9 @@ without counted ticks has rolled 1 m at an oscillating speed. The error ``SWINGI
 wheel's distance is added separately.
 """
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviation of a wheel's distance after lost reports, as a fraction of the distance that
-the wheel rolled in their time. First value: at a steady speed. Second value: at an oscillating
-speed. Only for a wheel without counted ticks.
+"""Standard deviation of the distance that a wheel rolled while reports were lost, as a fraction of
+this distance. The first value is for a steady speed, the second for an oscillating speed. Only for
+a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5

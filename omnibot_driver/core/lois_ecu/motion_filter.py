@@ -94,10 +94,11 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Expected difference between the two measured wheel speeds, in m/s: its smallest value
-        since the board's distance was last compared with the estimated distance.
+        """Smallest expected difference, in m/s, between the two measured wheel speeds since the
+        board's distance was last compared with the estimated distance.
 
-        While both speeds are equal, the public firmware does not update its position.
+        While both speeds are equal, the public firmware does not update its position. So after a
+        small difference, the board's distance may be too short.
         """
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)

@@ -320,10 +320,10 @@ class SettingsWriter:
     def _writes_ticks(self, now: float) -> bool:
         """Return whether a round that begins now writes the period of the ticks.
 
-        A written period begins anew on the board, which makes this interval longer. If each round
-        wrote the period, no ticks might come until the rounds are over. So ticks must come before
-        a round writes the period again. Most of the later rounds leave the ticks alone: else no
-        interval could confirm the period.
+        When the period is written, the board begins it anew, so the next ticks come later. If each
+        round wrote a long period, no ticks might come until the rounds are over. So a long period
+        is written again only after ticks have come, or after ``TICKS_DUE_S`` without ticks. After ``ROUNDS`` rounds, only every third round writes the period, because only ticks at
+        undisturbed intervals can confirm it.
         """
         awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S
         return not (awaited and self._slow_ticks) and (

@@ -27,11 +27,11 @@ Only a working IMU reports the turn.
 """
 
 SUPERVISED_S: Final = 1.0
-"""Time in s for a backward drive (B). If the server has answered no change of the motors' units for
-this time, the driver sends ``CS 0 0``, which changes nothing.
+"""Longest time in s, in a backward drive (B), without an answered change of the motors' units.
 
-The answer shows that the server still supervises the motion. If the server was restarted, the
-motors run on without supervision.
+After this time, the driver sends ``CS 0 0``, a change of the units by zero. The answer shows that
+the server still supervises the motion. If the server was restarted, the motors run on without
+supervision.
 """
 STARTED_M: Final = 0.01
 """Distance in m after which it is certain that the current units are enough to turn the motors."""

@@ -110,8 +110,8 @@ class Conversation:
       foreign, or they answer a repeated stop.
     * ``trip_s``: average duration of a query, in s; each unanswered query increases it.
     * ``answered_trip_s``: average duration of answered queries, in s.
-    * ``missed_s``: time in s at which the driver last stopped waiting for an overdue reply, or at
-      which a stop ended that took three commands.
+    * ``missed_s``: time in s of the last sign that a reply was lost: the driver gave up an overdue
+      reply, or ended a stop after at least three stop commands.
     """
 
     def __init__(self, delay_s: float) -> None:

@@ -19,9 +19,9 @@ from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.words import Form, Request, Word
 
 QUIET_S: Final = 1.0
-"""Time in s without a piece of a file after which the driver expects no more pieces.
+"""Time in s without a new piece of a file after which the driver ends the download.
 
-A third of this time is enough after all bytes have arrived.
+If all bytes of the file have arrived, the driver waits for only a third of this time.
 """
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn, while the robot is at rest.

@@ -63,7 +63,10 @@ class SwitchOff:
         self.needed = not self._refused
 
     def begins(self, *, straight: bool) -> None:
-        """Record that a motion begins. The motion sets both motors: an earlier need for MCS ends.
+        """Record that a motion begins.
+
+        The motion sets the speeds of both motors. So MCS (switch off the motors) is no longer
+        needed for a motor that was on before.
 
         ``straight``: whether it is a straight controlled move, after which a motor may stay on.
         """

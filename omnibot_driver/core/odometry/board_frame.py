@@ -78,12 +78,12 @@ class BoardFrame:
 
         ``reachable``: whether the robot can have reached ``told`` without a restart.
 
-        Two poses are expected. The *new* one assumes that the board's pose was zero at the restart.
-        The *old* one assumes that the board did not restart. A pose *fits* if it is near an
-        expected pose. The first rule that applies gives the result:
+        There are two expected poses. The *new* pose assumes that the board's pose was zero at the
+        restart. The *old* pose assumes that the board did not restart. ``told`` *fits* an expected
+        pose if it is near this pose. The first rule that applies gives the result:
 
-        * ``told`` fits the new one, and is nearer to it than to the old one: True.
-        * ``told`` fits the old one: False, and the suspicion ends.
+        * ``told`` fits the new pose, and is nearer to the new pose than to the old pose: True.
+        * ``told`` fits the old pose: False, and the suspicion ends.
         * ``told`` is confirmed and reachable: False, and the suspicion ends.
         * In all other cases: ``confirmed``.
         """

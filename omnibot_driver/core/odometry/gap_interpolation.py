@@ -27,9 +27,10 @@ class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after the loss.
 
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
-      If only poses arrive, ``last`` is the mean motion per displacement between accepted poses.
+      If only poses arrive, ``last`` is the motion between two accepted poses, divided by the number
+      of lost displacements.
     * ``missing``: number of displacements that were lost after the last displacement or accepted
-      pose. A pose has shown the loss, and the lost motion was assumed to be like ``last``.
+      pose. A pose has shown the loss. Each lost displacement was assumed to be like ``last``.
     """
 
     def __init__(self) -> None:

@@ -25,8 +25,8 @@ COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 """The bytes that occur in frame headers.
 
-If a frame has lost a byte, the decoder takes the first byte of the next header for its last byte.
-So a frame that ends with one of these values may be damaged.
+If a frame has lost a byte, the decoder takes the first byte of the next header for the frame's last
+byte. So a frame that ends with one of these values may be damaged.
 """
 
 _IMU: Final = struct.Struct(">2s6h")

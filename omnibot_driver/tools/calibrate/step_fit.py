@@ -68,8 +68,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: returns the model's mean rate in each delta after a unit step. Its argument has
-        the end of each delta, in ticks after the unit step.
+        ``mean``: a function that returns the model's mean rate in each delta after a unit step. The
+        argument of the function is an array with the end of each delta, in ticks after the step.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps

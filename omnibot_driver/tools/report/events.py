@@ -16,9 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Age of a state, in s. If /diagnostics still reports the state at this age, the driver still runs.
+"""Age of a state, in s, after which a report of the state in /diagnostics shows a running driver.
 
-Without such a report, a driver whose last state is "disconnected" has ended.
+If the last state is "disconnected", and there is no such report, the driver has ended.
 """
 
 

@@ -62,7 +62,8 @@ class Series:
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
         """Return, for each time in ``at_s``, the last row that had arrived by then.
 
-        Zeros: no row had arrived, or the row was older than ``timeout_s``.
+        The result is a row of zeros if no row had arrived, or if the row was older than
+        ``timeout_s``.
         """
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):

@@ -211,9 +211,9 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """A motion is halted, so the driver must send Stop. Before it does, it discards all commands.
+    """After all commands are discarded, the driver writes nothing, not even a Stop that is due.
 
-    Afterwards, the driver writes nothing, not even this Stop.
+    The Stop is due because a motion was halted just before.
     """
     order(stream, GO, 1.0)
     stream.halt(1.0)

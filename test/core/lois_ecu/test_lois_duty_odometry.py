@@ -32,7 +32,8 @@ def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
 def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
     """Odometry includes a forward drive by duty in which the firmware counts no ticks.
 
-    The board's own odometry (0x20) does not change either. The driver does not take this for rest.
+    The board's own odometry (0x20) does not change in this drive. The driver does not conclude that
+    the robot is at rest.
     """
     one = by_duty([(3.0, PUSH)], seed)
     assert one.way_m > 0.7

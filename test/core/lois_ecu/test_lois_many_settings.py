@@ -72,7 +72,11 @@ def periods_written(bench: Bench, ticks_ms: int) -> int:
 
 
 def test_a_long_period_is_written_four_times() -> None:
-    """Single lines are lost. Ticks cannot tell a period of 0.5 s from the board's own 0.4 s."""
+    """The driver writes a period of 0.5 s at least four times, because single lines may be lost.
+
+    The ticks do not show such a loss: they may come every 0.4 s by the board's own setting, and the
+    driver cannot tell this interval from 0.5 s.
+    """
     bench = Bench("firmware", own_periods=True)
     bench.run(5.0)
     assert periods_written(bench, 500) >= 4

@@ -90,8 +90,8 @@ def test_another_speed_ends_the_rest() -> None:
 def test_a_fall_that_was_not_told_is_seen() -> None:
     """A fall from an estimated 28 RPM to a reported 14 RPM shows that the wheel is at rest.
 
-    The driver estimates the speed while the board reports none. The board reports none while both
-    wheels have the same speed.
+    The board reports no speeds while both wheels have the same speed. Until the next report, the
+    driver estimates the speed.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):

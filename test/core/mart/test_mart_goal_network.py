@@ -321,7 +321,11 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 
 
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
-    """A late answer to HELLO does not prove that no copy of a move runs. The copy is stopped."""
+    """A late answer to HELLO does not hide a running copy of a move: the copy is stopped.
+
+    While a move runs, the server does not answer HELLO (query of its name). But a late answer may
+    arrive in this time.
+    """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]
 

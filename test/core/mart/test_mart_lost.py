@@ -45,7 +45,7 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """A server with a hung stop port gets no motion until a restart, even if the IMU works again.
 
-    A changed heading does not show a restart, which would set the heading to zero.
+    A changed heading does not show a restart: a restart would set the heading to zero.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False

@@ -153,9 +153,10 @@ def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_
 def test_a_restart_just_after_a_long_turn_on_the_spot_does_not_crash_the_server(
     boot_s: float,
 ) -> None:
-    """The server restarts at rest, before it was asked for the voltage after a turn of 12 s.
+    """After a turn of 12 s, the server restarts at rest, before the driver asks for the voltage.
 
-    A reply is missing, so the driver does not send VOLTS yet, although the last one was long ago.
+    The query of the voltage (VOLTS) crashes a server that is starting up. A reply is missing, so
+    the driver waits before it sends VOLTS, although the last VOLTS was long ago.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 12.0)

@@ -38,10 +38,10 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """When the true speed at 14 units is measured, the learnt speed at 14 units does not decrease.
+    """A measured speed above the learnt speed at 14 units does not decrease the learnt speed.
 
-    The motor is faster than expected. Before this, a speed at 26 units was measured too low, which
-    has already lowered the learnt line.
+    The measured speed is the true one. An earlier measurement at 26 units was too low, and has
+    lowered the learnt line.
     """
     line = MotorLine()
     for _ in range(8):

@@ -351,11 +351,11 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 
 
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
-    """A second copy of the reply to MSM is not taken for the reply to RST IMU (check of the IMU).
+    """A copy of the reply to MSM is not taken for the reply to RST IMU (check of the IMU).
 
-    The reply to RST IMU would permit SRM (a stop). But the stop port has ended the motion, so SRM
-    would hang the server. A notice says that the server reports a motion although the robot is at
-    rest.
+    MSM ends the direct control of the motors. After a reply to RST IMU, the driver might send the
+    stop command SRM. But the stop port has ended the motion, so SRM would hang the server. A notice
+    says that the server reports a motion although the robot is at rest.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.server.receive(b"RM 30", 0, None, 0.0)

@@ -86,11 +86,11 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     interrupt: Callable[[Sequence], None],
 ) -> None:
-    """After a gap of 2.1 s, both counters fit a restart as well as a loss of all deltas.
+    """After a gap of 2.1 s, the delta and pose counters fit a restart and a loss of all deltas.
 
-    Before the first pose, the board is paused, or the port is opened again. The pose is ambiguous
-    nevertheless, because it is the first one after the gap. If the driver took it for certain,
-    ``odom`` would move to the old origin after a restart.
+    The board is paused, or the port is opened again, between the gap and the first pose after it.
+    This pose is still ambiguous. If the driver took the pose for certain, ``odom`` would move to
+    the old origin after a restart.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1

@@ -276,7 +276,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 def slow_boot(quirks: Quirks) -> bool:
     """Return whether the board sends nothing and obeys nothing in the first 2 s after power-up.
 
-    The board obeys commands from these 2 s afterwards.
+    The board keeps the commands that arrive in these 2 s, and obeys them afterwards.
     """
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))
