@@ -40,8 +40,8 @@ def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]
 def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
     """If only the pose shows that the board has restarted in a gap, odom does not jump.
 
-    The count of the first delta after the gap fits by chance. The gap is long enough for a drive to
-    the board's new origin.
+    By chance, the count of the first delta after the gap shows no restart. The gap is long enough
+    for a drive to the board's new origin.
     """
     odometry, estimates = driven(75, 0.004)
     before = last(estimates)

@@ -52,8 +52,8 @@ the magnitude of ``_evidence_s`` is still below ``KNOWN_S``.
 MOST: Final = 10
 """Largest magnitude of a counter in ``_outside``."""
 UNPOSED: Final = 20
-"""Number of gyro lines, or of acceleration lines, since the last pose, above which a pair that
-waits for the next pose is rejected.
+"""Largest number of gyro lines, or of acceleration lines, after the last pose, for which a doubtful
+pair waits for the next pose. With more lines, the pair is rejected.
 """
 
 

@@ -334,9 +334,10 @@ class LoisOdometry:
 
     @property
     def _blind(self) -> bool:
-        """Whether the ticks alone do not show the motion of both wheels.
+        """Whether the ticks of at least one wheel do not show its motion.
 
-        The board counts the ticks of a wheel that rolls out backward as if it rolled forward.
+        The board counts the ticks of a wheel that rolls out backward as if the wheel rolled
+        forward.
         """
         return not self._motion.signed and any(
             wheel.blind or (wheel.rolls_on and wheel.rolls_on_s) for wheel in self._motion.wheels

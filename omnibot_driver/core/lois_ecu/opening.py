@@ -322,7 +322,8 @@ class SettingsWriter:
 
         When the period is written, the board begins it anew, so the next ticks come later. If each
         round wrote a long period, no ticks might come until the rounds are over. So a long period
-        is written again only after ticks have come, or after ``TICKS_DUE_S`` without ticks. After ``ROUNDS`` rounds, only every third round writes the period, because only ticks at
+        is written again only after ticks have come, or after ``TICKS_DUE_S`` without ticks. After
+        ``ROUNDS`` rounds, only every third round writes the period, because only ticks at
         undisturbed intervals can confirm it.
         """
         awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S

@@ -58,8 +58,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the result of the reset now.
 
-        The counts ``ticks`` must be near zero, and must prove the reset. After ``UNPROVED_S``, no
-        proof is necessary.
+        The counts ``ticks`` must be near zero, and must prove the reset. If the counts are near
+        zero after ``UNPROVED_S``, no proof is necessary.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

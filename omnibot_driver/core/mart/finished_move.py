@@ -147,10 +147,10 @@ class Done:
 
     @property
     def lags(self) -> bool:
-        """Whether a move that was cut short went much less far than is usual in its duration.
+        """Whether an incomplete move went much less far than a move usually goes in this time.
 
-        If a duplicated request made the server run the move twice, the encoder may show only the
-        second run.
+        The cause may be a duplicated request, which makes the server run the move twice. The
+        encoder may then show only the second run.
         """
         driven_s = self.lasted_s - 2 * SETTLES_S
         least = LEAST_PACE * self.asked * driven_s / (self.usual_s - SETTLES_S)

@@ -224,7 +224,8 @@ class SpeedLoop(Motors):
 
         The displacement also updates the heading error.
 
-        ``right_only``: whether only the right wheel was measured. Both lines then change equally.
+        ``right_only``: whether only the right wheel was measured. The learnt line of the left motor
+        is then changed like that of the right motor.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

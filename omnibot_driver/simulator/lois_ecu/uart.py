@@ -84,8 +84,8 @@ class Uart:
     def send(self, sent: bytearray) -> bool:
         """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
-        Return True if data that is sent with interrupts off ends in this step. The caller must then
-        call ``hear_kept``.
+        Return True if this step completes data that the board sends with interrupts off. The caller
+        must then call ``hear_kept``.
         """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, MOST_CREDIT)
         while self._sending and self._out_credit >= 1.0:

@@ -275,7 +275,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    A decreased count is regarded as that of a restarted driver, which counts from zero again.
+    If a count has decreased, the driver is assumed to have restarted, and to count from zero again.
     """
     if not log.alone:
         return None

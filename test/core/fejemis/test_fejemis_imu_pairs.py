@@ -286,8 +286,8 @@ def test_no_pair_has_lines_of_two_samples(
     Lines are lost, repeated or late. The mistake is hidden if the first line of the pair is late,
     the second is read less than 5 ms later, and no pose follows in the same read.
 
-    ``period_s``: period of the reads in s, which must differ from the period of the samples. None:
-    each line is read as soon as it arrives, except while the host is busy.
+    ``period_s``: period of the reads in s, which must differ from the period of the samples. If it
+    is None, each line is read as soon as it arrives, except while the host is busy.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

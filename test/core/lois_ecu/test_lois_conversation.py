@@ -137,7 +137,8 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.
 
-    The public firmware counts no ticks in a backward drive. After such a drive, they prove nothing.
+    The public firmware counts no ticks in a backward drive. So after a backward drive, the ticks do
+    not prove that the robot is at rest.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)

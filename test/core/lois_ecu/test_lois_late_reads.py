@@ -113,7 +113,7 @@ def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
 def test_the_clock_after_a_restart_is_not_slowed_by_sending() -> None:
     """While the public firmware sends, its clock does not run: 200 ms of the clock take 218 ms.
 
-    While the board boots, it sends nothing. So its clock then shows the true time.
+    While the board boots, it sends nothing, so its clock runs at the right rate.
     """
     late_reads = LateReads()
     for number in range(5):
