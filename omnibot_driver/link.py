@@ -31,8 +31,8 @@ STANDS_WITHIN_S: Final = 0.5
 """Limit, in s, for the wait at shutdown for a proof that the robot is at rest. For a slow board,
 the limit is larger."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard can repeat
-Stop after the shutdown."""
+"""Limit, in s, for the wait at shutdown for a proof that the robot is at rest, if no guard can
+repeat Stop after the shutdown. For a slow board, the limit is larger."""
 SILENCE_S: Final = 0.25
 """Longest wait at shutdown, in s, for the second proof that the robot is at rest. For a slow board,
 the driver waits longer. A Stop that is damaged on the line may move the robot; the second proof

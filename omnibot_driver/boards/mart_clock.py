@@ -16,9 +16,12 @@ the next full minute. The controller's clock is then at most 4 s fast.
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
-    """Return month, day, year, hour, minute and second (UTC) for TIME, or None if TIME must wait.
+    """Return month, day, year, hour, minute and second (UTC) for the command TIME, or None.
 
     ``now_s``: present time in s since 1970.
+
+    ``may_set_back``: whether TIME may set the controller's clock back. If not, the result is None
+    until the minute is nearly over (``ENDS_S``), and TIME must wait.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -42,8 +42,9 @@ class RelativeHeading:
     """The relative heading within a motion.
 
     * ``told_s``: time of the last accepted heading.
-    * ``from_s``: earliest time at which the last certain heading may have been measured. A heading
-      is certain if it must be the answer to the last query of the heading (RMRA).
+    * ``from_s``: earliest time at which the last certain heading may have been measured. A changed
+      heading is uncertain if its reply may answer an earlier query (RMRA). Headings are otherwise
+      certain.
     * ``changed_s``: time of the last change of heading.
     * ``same``: number of equal headings since the last change.
     """

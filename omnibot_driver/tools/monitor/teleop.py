@@ -11,8 +11,8 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
-"""Time in s for which a newly pressed key moves the robot. A keyboard begins to repeat the key
-after 0.25 s to 0.6 s, so within this time."""
+"""Time in s for which a newly pressed key moves the robot. Before this time is over, a keyboard
+begins to repeat the key: it does so after 0.25 s to 0.6 s."""
 REPEAT_S: Final = 0.3
 """Time in s for which a repeated key moves the robot. So the robot keeps moving if several
 repetitions are lost or late."""

@@ -106,7 +106,8 @@ def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -
 def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() -> None:
     """The front board answers the query ``fwoi`` with an error, because it does not know ``fwoi``.
 
-    The error proves that the board receives lines, so the loading succeeds.
+    The user has requested to load a configuration. The error proves that the front board receives
+    lines, so the request succeeds.
     """
     jobs = Jobs()
     jobs.ask(Job.LOAD, None, 0.0)

@@ -138,10 +138,10 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 
 
 def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() -> None:
-    """The server falls silent just before EXIT is sent.
+    """The server falls silent just before the driver sends EXIT, the command that ends the server.
 
     The result tells the user to copy the file from the controller. It does not say "call again",
-    because that cannot help.
+    because another call cannot help.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
