@@ -67,7 +67,7 @@ def _alone(node: Node, hardware_id: str) -> Publish:
 
 
 def _through_updater(node: Node, hardware_id: str) -> tuple[Publish, float] | None:
-    """Return a function that publishes with diagnostic_updater, and the period in s.
+    """Return a function that publishes with diagnostic_updater, and the period of its calls in s.
 
     Return None if diagnostic_updater is not installed.
     """

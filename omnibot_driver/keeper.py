@@ -26,8 +26,8 @@ RESTART_S: Final = 1.0
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""Number of killed guards that have not ended yet, at which the driver does not start another
-guard."""
+"""Largest number of killed guards that have not ended yet. At this number, the driver does not
+start another guard."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
 """Longest wait for a killed guard to end, in s. A guard that takes longer is in an uninterruptible

@@ -209,9 +209,9 @@ class _Offset:
         return difference_s - self._least_s - self._drift_s(at_s)
 
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest possible misfit of a message, for this offset alone.
+        """Return the smallest and the largest possible misfit of a message, in s, by this offset.
 
-        ``_Sender.misfit_s`` defines the misfit.
+        ``_Sender.misfit_s`` defines the misfit, and combines the results of its two offsets.
         """
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS

@@ -284,8 +284,9 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """The second message of a sender has two possible times of sending.
 
-    * The time estimated from the first message is 0.5 s too late, because this message was late.
-    * The time by the sender's clock is right in this test.
+    * One time is estimated from the arrival of the first message. The first message was 0.5 s
+      late, so this time is 0.5 s too late.
+    * The other time is that of the sender's clock. In this test, the sender's clock is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

@@ -26,10 +26,10 @@ A paused board sends a «Paused» text every second. If the board sends only dat
 command was lost.
 """
 FLOWING_S: Final = 0.1
-"""Largest part, in s, of an interval between two reads that counts for ``PAUSE_RETRY_S``.
+"""Longest interval between two reads, in s, that is added in full to the time ``PAUSE_RETRY_S``.
 
 A running board sends every 10 ms. In a longer interval, the board may have sent nothing for some
-time, so only this part is counted.
+time, so only ``FLOWING_S`` is added.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.

@@ -41,7 +41,8 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 class Relay:
     """A relay that publishes messages from the bytes of one read.
 
-    Each step of ``STEPS`` uses one of the methods that take the bytes.
+    The methods ``trust``, ``decode`` and ``measure`` take the bytes. Each step in ``STEPS`` calls
+    one of these methods.
     """
 
     def __init__(self, node: Node) -> None:

@@ -69,8 +69,8 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
     """A damaged pose leaves no error, although the next pose seems to show a restart.
 
-    The damaged pose also has a wrong count, which causes this impression. The next pose lies where
-    the odometry expects it, and removes the error.
+    The damaged pose also has a wrong count, so the right count of the next pose looks like that of
+    a restarted board. The next pose lies where the odometry expects it, and removes the error.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):

@@ -203,7 +203,8 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: float) -> None:
     """The first «Paused» text of a connection does not show that the board has restarted.
 
-    The driver knows no earlier number to compare with. So a reset whose R is lost fails.
+    The text has a number, but the driver knows no earlier number to compare it with. In this test,
+    R (reboot) is lost. So the driver reports that the reset has failed.
     """
     bench = Bench(run=False)
     bench.open()

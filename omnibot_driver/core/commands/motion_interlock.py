@@ -69,10 +69,11 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Restart the waiting time ``timeout_s`` after a first stop by the monitor.
+        """Restart the wait of ``timeout_s`` that ends the refusal after the monitor's first stop.
 
-        Call this method after a refused command, because its sender is still active. Call it also
-        after a stall of ``stalled_s``, because commands may have arrived unnoticed.
+        Call this method after a refused command, because the sender of the command is still active.
+        Call this method also after a stall of ``stalled_s`` (s), because commands may have arrived
+        unnoticed. If the wait was over before the stall, the refusal ends.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now

@@ -29,9 +29,9 @@ AT_LEAST: Final = 2
 A single displacement could be damaged, or come from the time before the wheels began to turn.
 """
 PROOFS: Final = 2.0
-"""Shortest time for which the driver waits for a proof, as a multiple of ``still_s``.
+"""The driver waits for a proof for at least this multiple of the standstill that proves a stop.
 
-``still_s`` is the duration of standstill that proves a stop.
+The standstill must last ``still_s``, minus ``SLACK_S``.
 """
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.

@@ -38,8 +38,10 @@ kernel's buffer may have overflowed and lost lines.
 """
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``: magnitude of ``_evidence_s``, in s, from which its sign shows which line of a sample
-comes first. ``SUREST_S``: largest magnitude of ``_evidence_s``, in s.
+"""The sign of the sum ``_evidence_s`` shows which line of a sample comes first.
+
+``KNOWN_S``: smallest magnitude of the sum, in s, from which the sign is used. ``SUREST_S``: largest
+magnitude of the sum, in s.
 """
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to the interval between a gyro and an acceleration line if another line
@@ -135,8 +137,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line. ``kind``: its keyword.
 
-        If the second line of a pair has not arrived yet, it is then regarded as lost, unless lines
-        of this ``kind`` usually come within a pair.
+        If a pair still waits for its second line, the second line is now regarded as lost. If lines
+        of this ``kind`` usually come within a pair, the pair waits on.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:

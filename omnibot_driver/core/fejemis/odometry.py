@@ -55,9 +55,9 @@ second pose differs from the wheels' motion, and the way from the origin to the 
 most as long as the wheels' motion.
 """
 LONGEST_JUMP_S: Final = 0.2
-"""Longest time in s since the last accepted pose in which rejected poses that contradict each other
-may be due to an origin that moves again and again. Later, the poses are right, and the wheel speeds
-are wrong."""
+"""Longest time in s since the last accepted pose in which the driver supposes that the origin moves
+again and again, if the motion between rejected poses contradicts the wheel speeds. After this time,
+the driver trusts the poses, and not the wheel speeds."""
 
 
 class PoseOdometry:
@@ -102,8 +102,9 @@ class PoseOdometry:
         self._before: WheelSpeeds | None = None
         self._speeds_s = self._time_s = -math.inf
         self._speeds_new = False
-        """Whether no pose has arrived since the last wheel speeds. ``_speeds_s``: board time, in s,
-        of the first pose after the last wheel speeds. ``_time_s``: board time of the last pose."""
+        """Whether the last wheel speeds still wait for the next pose. ``_speeds_s``: board time, in
+        s, of the first pose that arrived after wheel speeds. ``_time_s``: board time of the last
+        pose, in s."""
 
     @property
     def moving(self) -> bool:

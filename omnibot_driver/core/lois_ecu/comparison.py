@@ -54,9 +54,11 @@ this number of ticks. Otherwise, the next tick may not be due yet.
 """
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): a reported heading that differs
-from the expected one by more than both limits is ignored, because it comes from an outdated wheel
-speed. A reported distance that differs by more than ``LEAP`` is ignored too.
+"""Limits for the difference between a reported and an expected value: ``LEAP`` in standard
+deviations, ``LEAP_M`` in m at the rims.
+
+A heading beyond both limits is ignored, because it comes from an outdated wheel speed. A distance
+beyond ``LEAP`` is ignored too.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -76,9 +78,9 @@ a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Standard deviation of the error that remains after a wheel's distance was corrected by more than
-``CORRECTED_TICKS``, as a fraction of the part of the correction that exceeds ``CORRECTED_TICKS``.
-Only for a wheel without counted ticks.
+"""``CORRECTED_TICKS``: an error remains after a wheel's distance was corrected by more than this
+number of ticks. ``CORRECTED_PART``: standard deviation of this error, as a fraction of the excess
+of the correction over ``CORRECTED_TICKS``. Only for a wheel without counted ticks.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -229,7 +231,7 @@ class Comparison:
             self._take_equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Record that a wheel has come to rest, and remove the distance that was added after that.
+        """Record that a wheel is at rest, and subtract the distance since its last certain motion.
 
         ``index``: 0 left, 1 right.
         """

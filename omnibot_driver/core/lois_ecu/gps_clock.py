@@ -15,7 +15,8 @@ the date yet."""
 class GpsClock:
     """The date and the time that the GPS receiver reported last.
 
-    ``dated``: whether the last reported date is real, even if it is out of date after midnight.
+    ``dated``: whether the last reported date is real. ``dated`` stays True after midnight, although
+    the date is then that of the day before.
     """
 
     def __init__(self) -> None:

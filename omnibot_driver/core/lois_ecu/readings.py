@@ -55,8 +55,8 @@ class RecordReading(Unstamped):
 class RecordComes:
     """Notification that lines of a record are arriving.
 
-    The board takes up to 1.3 s to send a record. It also sends a record that the driver has given
-    up.
+    The board takes up to 1.3 s to send a record. It also sends a record for which the driver no
+    longer waits.
     """
 
 

@@ -19,11 +19,11 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Limit for a change of the motors' units, as a relative change. If the reply to a larger change is
-missing, the driver stops the robot.
+"""Largest relative change of the motors' units that may stay without a reply. If the reply to a
+larger change is missing, the driver stops the robot.
 
-The limit applies to a backward drive (B) in which the server reports no headings: the robot's turn
-is then computed from the units.
+The limit applies to a backward drive (B) in which the server reports no headings. In such a drive,
+the robot's turn is computed from the units.
 """
 
 

@@ -26,9 +26,9 @@ If all bytes of the file have arrived, the driver waits for only a third of this
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn, while the robot is at rest.
 
-``RECORD_S``: for the reply to the request; three average durations of a query are added.
+``RECORD_S``: wait for the reply to the request. Three average durations of a query are added.
 
-``RECORD_QUIET_S``: for each further piece of the file.
+``RECORD_QUIET_S``: wait for each further piece of the file.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a job in REPEATED."""

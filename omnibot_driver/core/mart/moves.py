@@ -126,8 +126,9 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a turn, learn later, from the server's record. If the network is bad, if no more
-        records are needed, or during another job, learn at once from the wheel.
+        After a straight move, learn at once from the wheel. After a turn, download the server's
+        record, and learn when the download has ended. If the network is bad, if no more records are
+        needed, or during another job, learn at once from the wheel after a turn too.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):

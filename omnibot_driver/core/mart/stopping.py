@@ -57,9 +57,9 @@ later: before its reply, it waits 0.75 s for the robot to stop.
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels did not stop in time.
 
-    The motors are off after this failure. For a controlled turn, the server may report it with a
-    wrong text: that the turn has not begun. After ``NO_START_S``, a turn has certainly begun, so
-    this text then means that the wheels did not stop in time.
+    The motors are off after this failure. After a controlled turn, the server may report wrongly
+    that the turn has not begun. If this report comes later than ``NO_START_S`` after the start, the
+    turn has certainly begun. The report then means that the wheels did not stop in time.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """

@@ -154,7 +154,7 @@ class Stops(Ground, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command, unless the driver already refuses the motion in progress.
+        the user's command, unless this motion is already refused until the command ends.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """

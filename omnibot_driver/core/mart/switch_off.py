@@ -89,7 +89,7 @@ class SwitchOff:
         self.underway = True
 
     def answered(self, word: Word, reply: Ok | Fail) -> None:
-        """Evaluate the reply to MCS or MSM.
+        """Evaluate the reply to MCS (motors off) or to MSM (motions allowed again).
 
         The failure CONFLICT shows that an earlier MCS has arrived and is in progress.
         """

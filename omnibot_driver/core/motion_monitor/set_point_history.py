@@ -13,7 +13,8 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 CommandedTwist = BodyTwist | None
-"""A commanded twist. None: the twist is not known in advance, because the robot goes to a goal."""
+"""A commanded twist, or None for a goal: the twist of a robot that goes to a goal is not known in
+advance."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]

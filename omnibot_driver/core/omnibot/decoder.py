@@ -37,8 +37,8 @@ SPOKEN_AGAINST: Final = 3.0
 """A frame must wait if the cost of its content is at least this value. The bytes after the frame
 then decide whether the decoder accepts it."""
 DOUBT_BYTES: Final = 170
-"""Largest number of uncertain bytes. When it is reached, the decoder decides on their first half.
-In nominal mode, the board sends this number of bytes in 100 ms."""
+"""Largest number of uncertain bytes. When this number is reached, the decoder decides on the first
+half of these bytes. In nominal mode, the board sends this number of bytes in 100 ms."""
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Least number of bytes for which the fast path is tried: the length of the shortest frame."""
 CALM_S: Final = 10.0

@@ -95,8 +95,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, a shock of the robot has caused the unusual content, not damage. The result is also False
-    if the complete frame is followed by bytes that cannot begin another frame.
+    If so, a shock of the robot has caused the unusual content, not damage. If the complete frame is
+    followed by bytes that cannot begin another frame, the result is False.
 
     ``closed``: whether no more bytes come. If ``held`` ends at ``at``, the result is ``closed``.
     """

@@ -35,8 +35,9 @@ board's pose can then prove a restart.
 EARLY_S: Final = 0.2
 """Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-If it did, the count times the period is less than the time since the last delta was read. It can be
-more only if the driver read this delta very late. The tolerance allows for this case.
+If the counter began at zero, its count times the period is less than the time since the last delta
+was read. The product is larger only if the driver read the last delta very late. The tolerance
+allows for such a late read.
 """
 LONG_GAP_S: Final = 1.0
 """Longest gap before a pose, in s, after which this pose can still show a restart of the board. The
@@ -105,9 +106,10 @@ class Sequence:
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
-        The duration of the pause is unknown. So if the next delta does not continue the count, the
-        board may have restarted, and its first deltas may be lost. Poses could disprove a restart.
-        Without them, only a low count is regarded as a restart.
+        The duration of the pause is unknown. If the next delta does not continue the count, the
+        driver supposes a restart, even if the count is not low: the first deltas after a restart
+        may be lost. A pose can disprove the restart. If the board sends no poses, the driver
+        supposes a restart only if the count is low.
         """
         self._paused, self._pose = True, None
 

@@ -89,8 +89,8 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """For each frame that it decodes, the fast path subtracts 1 from ``singles_to_come``.
-        ``_most_singles`` is the value before the first subtraction."""
+        """Number of IMU frames that the fast path may still decode; it subtracts 1 for each frame.
+        ``_most_singles``: this number before the first subtraction."""
         self.heard_s = -math.inf
         self._behind_s = 0.0
         """Delay of the last read in s: the time from the sending of its last byte to the read."""

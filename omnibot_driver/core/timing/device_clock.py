@@ -289,9 +289,9 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: time in s from the last stamp to the read, divided among the stamps that are
-        still to be set. The smallest step is half a period or ``room_s``, whichever is shorter, but
-        at least ``SMALLEST_STEP_S``.
+        ``room_s``: the time from the last stamp to the read, divided equally among the steps in
+        this time, in s. The step to the new stamp is at least half a period or ``room_s``,
+        whichever is shorter, and at least ``SMALLEST_STEP_S``.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -46,9 +46,10 @@ QUIET_S: Final = 0.5
 board can miss encoder ticks while it sends. If the user has not set ``ticks_period``, the tool does
 not change the board's own period, because it could not restore that period."""
 RATE_SHOWN: Final = "Odometry rate (Hz)"
-"""Name in /diagnostics of the rate at which the board sends its ticks: "measured of expected".
+"""Name in /diagnostics of the rate at which the board sends its ticks.
 
-If the user has not set ``ticks_period``, the driver measures the expected rate as well.
+The value has the form "measured of expected". If the user has not set ``ticks_period``, the driver
+measures the expected rate as well.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""

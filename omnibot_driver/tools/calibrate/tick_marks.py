@@ -97,9 +97,10 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return the relative errors of the distances from each mark to the next.
+    """Return, for each mark, the relative error of the distance to the next mark.
 
-    Each is the median over all turns, minus the mean of the medians.
+    This error is the median of the mark's errors in all turns, minus the mean of all marks'
+    medians.
 
     * ``rows``: for each record, the relative errors of its times between ticks.
     * ``firsts``: for each record, the number of its first mark.

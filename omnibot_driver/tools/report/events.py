@@ -81,7 +81,8 @@ def _lost(states: list[Span]) -> list[Span]:
 def _alive(log: Log, state: Span) -> bool:
     """Return whether the driver was still running in ``state``, the last state in the log.
 
-    It was running if /diagnostics shows the state more than 2 s (``SILENT_S``) after its beginning.
+    It was running if /diagnostics shows this state more than 2 s (``SILENT_S``) after the state
+    began.
     """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what

@@ -48,8 +48,8 @@ class Answer:
 
     ``error``: for each axis, rms of measured - gain · commanded motion.
 
-    ``spread``: for each axis, ``error`` / rms of the command; infinite if no command was constant
-    for long enough. The gain then also depends on how fast the motors react.
+    ``spread``: for each axis, ``error`` / rms of the command. ``spread`` is infinite if no command
+    was constant for long enough: in this case, the gain also depends on how fast the motors react.
     """
 
     lag_s: float

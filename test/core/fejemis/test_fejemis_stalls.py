@@ -59,7 +59,8 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
     """The odometry contains the whole motion of a drive during a stall of the driver.
 
     If the driver does not notice the stall, it rejects the lines that are over 1 s late. The first
-    displacement afterwards covers several seconds. The driver does not reject it as implausible.
+    displacement after these lines covers several seconds. The driver does not reject this
+    displacement as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)

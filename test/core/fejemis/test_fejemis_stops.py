@@ -138,9 +138,9 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 
 
 def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
-    """The refusal of motion without data says at first only that nothing was read from the boards.
+    """The boards fall silent, and motion is refused: "read nothing from either board".
 
-    A few seconds later, it says that the boards send no data.
+    A few seconds later, the refusal says that the boards send no data.
     """
     bench = nominal()
     bench.drive_on()

@@ -88,8 +88,8 @@ def test_a_pose_set_to_zero_twice_at_once_does_not_move_the_odometry(
 def test_a_pose_set_to_zero_before_three_poses_in_a_row_loses_no_motion(v: float) -> None:
     """The board's pose is set to zero before each of three poses, 20 ms apart, in a steady drive.
 
-    Regression: the motion between two of them, up to 9 mm, was taken from the poses, which show
-    none.
+    Regression: between two of these poses, the robot drove up to 9 mm, but the odometry used the
+    poses, which show no motion.
     """
     drive = Drive()
     drive.run(v, 0.0, 1.0)

@@ -70,9 +70,9 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """Equal angles in reply to RMRA (heading query) and RMCS (change of speed) both count.
+    """A heading query (RMRA) and then a speed change (RMCS) are answered with the same angle.
 
-    The second reply is not taken for a copy of the first.
+    The driver accepts both replies. It does not take the second reply for a copy of the first.
     """
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)

@@ -122,9 +122,10 @@ def test_an_empty_datagram_is_no_piece(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """If a zero command cancels the download of the log, the result says that the server has ended.
+    """A zero command cancels the download of the log after EXIT has ended the server.
 
-    EXIT has ended the server. The user must copy the file from the controller.
+    The result says that the server has ended, and that the user must copy the file from the
+    controller.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success

@@ -141,8 +141,9 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn with a wrong rate is started again with other motor units.
 
-    This also holds if the angle of the first turn is unknown. The angle is unknown if a heavy robot
-    stops too slowly, or if the reply to the stop is late. The encoder then shows the motors' speed.
+    This also holds if the driver does not get the angle of the first turn, because a heavy robot
+    stops too slowly, or because the reply to the stop is late. Without the angle, the encoder shows
+    the motors' speed.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

@@ -14,7 +14,8 @@ pytestmark = pytest.mark.slow
 def test_odometry_is_no_farther_off_than_its_covariance_says(network: str) -> None:
     """The error of the odometry fits its covariance, in drives of all kinds.
 
-    The network that only delays is left out: the worst network has the same delays.
+    The network that only delays datagrams is not tested, because the worst network has the same
+    delays.
     """
     drives = [list(drive(NETWORKS[network], seed)) for seed in range(3)]
     every = [value for each in drives for value in each]

@@ -351,7 +351,8 @@ def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarte
 def test_a_quick_restart_in_a_backward_drive_is_noticed(firmware: Firmware, boot_s: float) -> None:
     """A quick restart in B (backward drive) is noticed, and the driver begins the drive anew.
 
-    The restarted server refuses ``CS 0 0``, which the driver sends once a second.
+    After each second without another speed change, the driver sends ``CS 0 0``, a change by zero.
+    The restarted server refuses it.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 4.0)

@@ -127,10 +127,10 @@ def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
 ) -> None:
     """After a silence of 4 s or 7 s, the next count may be that of a board that has restarted.
 
-    The board may have counted up to this number again, so the driver supposes a restart. The
-    counter of the next pose decides. It shows the restart, or it continues, because the board only
-    stood still. So the delta alone does not count as a restart. This is also true if the silence is
-    nearer to the 10.24 s of a wrap than to 0.
+    A restarted board may have counted up to this number, so the driver supposes a restart. The
+    restart is doubtful until the next pose. The counter of this pose shows the restart, or it
+    continues, because the board was only silent. This is also true if the silence is nearer to the
+    10.24 s in which the delta counter wraps than to 0.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
@@ -188,9 +188,9 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """A delta with the count 0 may show a restart; the count 0 of the next pose confirms it.
+    """A delta with the count 0 may show a restart. The next pose confirms it by its own count 0.
 
-    The next delta then has the count 1, and the driver counts no delta as lost.
+    The delta after this pose has the count 1, and the driver counts no delta as lost.
     """
     sequence = Sequence()
     for count in range(171):

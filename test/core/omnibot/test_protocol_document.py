@@ -164,9 +164,9 @@ def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
 
 
 def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
-    """Examples with a motion in SI units are encoded by the driver to the bytes of the example.
+    """Some examples have a remark that gives a motion in SI units.
 
-    The motion is in the example's remark.
+    The driver encodes this motion to the bytes of the example.
     """
     wishes = [
         (example, [float(part.split()[0]) for part in example.remark.split(",")])

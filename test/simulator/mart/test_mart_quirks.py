@@ -27,7 +27,7 @@ IN_SOURCE_ALONE = (
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
     """Return whether a drive (F) stopped by SL on the stop port still counts as in progress.
 
-    The server then refuses other motions, and the stop SM hangs the command port.
+    If so, the server refuses other motions, and the stop SM hangs the command port.
     """
     rig = Rig(quirks)
     rig.drive("F")
