@@ -41,14 +41,14 @@ GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that a wheel is at rest, by the number of times that its reported speed was
 repeated. ``FASTER`` is assumed; the others were counted on the public firmware. They depend on the
-last change of the reported speed:
+last change of the reported speed. A fall is a decrease by at least ``FELL_RPM``:
 
 * ``FAST``: after a fall to a speed above ``FAST_RPM``.
 * ``FAR``: after a fall by at least ``FELL_FAR_RPM``.
-* ``LONE``: after such a fall from a speed that was reported only once.
-* ``NEAR``: after a smaller fall.
-* ``FELL_IN_GAPS``: while reports are lost, after a smaller fall, or after a fall from a speed that
-  was reported only once.
+* ``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
+* ``NEAR``: after a fall by less than ``FELL_FAR_RPM``.
+* ``FELL_IN_GAPS``: while reports are lost, after a fall by less than ``FELL_FAR_RPM``, or after a
+  fall from a speed that was reported only once.
 * ``GAPS``: while reports are lost, without a reported fall.
 * ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. The wheel rolls
   on, unless a late tick has made the speed wrong.

@@ -335,7 +335,8 @@ class SpeedLoop(Motors):
     def answered_again(self) -> None:
         """Record that the server may have carried out a change twice, because it answered twice.
 
-        The uncertainty of the wheel speed ratio grows by the largest possible effect.
+        The uncertainty of the wheel speed ratio grows by the largest possible effect of a second
+        change.
         """
         self._unsure += self._copy**2
         self._copy = 0.0

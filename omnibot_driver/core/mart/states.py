@@ -169,7 +169,7 @@ WHILE: Final[Mapping[Motion, State]] = {
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:
-    """Return whether the command may be sent now.
+    """Return whether the command ``word`` may be sent in the state ``state``.
 
     ``motion``: the motion that is, or may be, in progress.
     """

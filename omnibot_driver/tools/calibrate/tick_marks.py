@@ -20,8 +20,8 @@ LARGEST: Final = 0.5
 """Largest plausible relative error of a time between ticks. A larger error shows a missed edge of
 the encoder's signal."""
 OUTLIER: Final = 4.5
-"""Size, in standard deviations, up to which a relative error of a time between ticks is used. The
-standard deviation is estimated from the median size of all errors."""
+"""Largest relative error of a time between ticks, in standard deviations, that is used. The
+standard deviation is estimated from the median magnitude of all errors."""
 EXPLAINED: Final = 0.4
 """Smallest fraction of the variance that fitted marks must explain. For evenly spaced marks, the
 fraction is below 0.2 (test with three records of two turns each)."""

@@ -327,9 +327,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A knock is released at once if the full scale is infinite, as for a sensor that sends text.
+    """A knock comes out of the filter at once if the full scale is infinite, as for a text sensor.
 
-    Damage to a text does not change a single bit of a value.
+    The filter does not suspect a flipped bit, because damage to a text does not flip a single bit
+    of a value.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]

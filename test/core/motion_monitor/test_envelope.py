@@ -180,9 +180,10 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """If a robot moves faster than its set-points allow, the wind-up shrinks by the extra distance.
+    """The wind-up is the extra distance that a robot may drive after it was held or pushed.
 
-    The wind-up does not fall below zero.
+    If the robot moves faster than its set-points allow, the wind-up shrinks by the extra distance,
+    but not below zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

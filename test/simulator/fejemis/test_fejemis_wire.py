@@ -123,9 +123,9 @@ def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
 
 
 def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
-    """The host subscribes to a message of the front Teensy. The Teensy does not acknowledge it.
+    """The front Teensy does not acknowledge the host's subscription to a message.
 
-    It sends the message periodically until the host sets the period to zero.
+    The Teensy sends the message periodically until the host sets the period to zero.
     """
     rig = Rig().booted()
     assert rig.ask(FRONT, "sub fwl 15") == []

@@ -143,9 +143,10 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """A counting receiver completes a stop frame that lacks a byte with the FF of the next frame.
+    """A stop frame has lost its last byte, and another frame follows.
 
-    So wheel C turns at 255 LSB.
+    A receiver that counts bytes takes the first byte (FF) of the next frame for the lost byte. So
+    wheel C turns at 255 LSB.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
