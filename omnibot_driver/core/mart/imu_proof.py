@@ -25,8 +25,8 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, the network has delayed request and reply. Half of the additional time is
-assumed to be the age of the result when it arrives.
+If a check takes longer, the network is assumed to have delayed request and reply equally. Half of
+the additional time is then the age of the result when it arrives.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""

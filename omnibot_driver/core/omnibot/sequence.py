@@ -108,8 +108,8 @@ class Sequence:
 
         The duration of the pause is unknown. If the next delta does not continue the count, the
         driver supposes a restart, even if the count is not low: the first deltas after a restart
-        may be lost. A pose can disprove the restart. If the board sends no poses, the driver
-        supposes a restart only if the count is low.
+        may be lost. A pose can disprove the restart. Without poses, nothing can disprove it, so the
+        driver supposes a restart only if the count is low.
         """
         self._paused, self._pose = True, None
 

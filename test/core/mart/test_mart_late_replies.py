@@ -302,7 +302,8 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 ) -> None:
     """A late ok to an IMU check does not confirm a turn whose command was lost.
 
-    The encoder count is still that of the previous motion. The odometry does not add it again.
+    The encoder count is still that of the previous motion. The odometry does not add this
+    count again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)

@@ -188,7 +188,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """A delta with the count 0 may show a restart. The next pose confirms it by its own count 0.
+    """A delta with the count 0 may show a restart. A pose with the count 0 confirms the restart.
 
     The delta after this pose has the count 1, and the driver counts no delta as lost.
     """

@@ -157,9 +157,9 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
 def test_a_first_port_that_has_no_next_port_is_chosen_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """If the first channel gets the highest port, no port is left for the second channel.
+    """The system chooses the highest port for the first channel.
 
-    The system chooses the first port. The simulator then lets it choose again.
+    No port is left for the second channel. So the simulator lets the system choose again.
     """
     choices = iter([LARGEST])
 
