@@ -6,7 +6,9 @@ ROS traffic stays within this test run. ``pytest --hypothesis-profile exploring`
 examples than usual.
 """
 
+import contextlib
 import os
+import socket
 import threading
 from collections import Counter
 from collections.abc import Iterator
@@ -23,9 +25,24 @@ if TYPE_CHECKING:
 
     from omnibot_driver.simulator.omnibot import PtyBoard
 
-# Domains 0 to 101 are safe on every platform; 0 is the default of all ROS programs, and some tests
-# need 100 and 101 without any driver.
-os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 99)
+
+def free_domain() -> tuple[int, socket.socket]:
+    """Return a ROS domain that no other test process uses, and the socket that marks it as used.
+
+    Domains 0 to 101 are safe on every platform. 0 is the default of all ROS programs, and some
+    tests need 100 and 101 without any driver.
+    """
+    for number in range(1, 100):
+        mark = socket.socket(socket.AF_UNIX)
+        with contextlib.suppress(OSError):
+            mark.bind(f"\0omnibot_driver.test.ros_domain.{number}")
+            return number, mark
+        mark.close()
+    raise OSError("all ROS domains from 1 to 99 are in use by other tests: end these tests first")
+
+
+DOMAIN, DOMAIN_MARK = free_domain()
+os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 ENDS_WITHIN_S = 60.0

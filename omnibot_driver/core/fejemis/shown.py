@@ -12,8 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of the driver's lines that the diagnostics show as unknown to the firmware. They
-are the latest such lines.
+"""The firmware reports commands that it does not know. The diagnostics show the latest ``SHOWN`` of
+the driver's commands that were reported in this way.
 """
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 

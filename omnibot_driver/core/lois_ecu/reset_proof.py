@@ -48,8 +48,9 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver repeats the reset.
 
-        ``before``: the counts at the repetition. They replace the earlier counts only if the wheels
-        are at rest (``steady``), and the counts are large enough to prove the reset.
+        ``before``: the tick counts at the repetition. If the wheels are at rest (``steady``), and
+        these counts are so large that a reset would change them visibly, they replace the tick
+        counts from before the reset.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

@@ -26,8 +26,8 @@ LOST_S: Final = 0.25
 """Limit for the mean time in s between the last ``LOST_REPORTS`` reports. If the mean time is above
 the limit, reports are lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
-"""Usual longest time in s between two reports. While many reports are lost, this module's clock
-advances by at most ``REPORT_S`` with each report that arrives, so that it keeps earlier speeds."""
+"""Longest time in s between two reports, if none is lost. While many reports are lost, this module
+counts at most ``REPORT_S`` for each report. Otherwise, it would forget earlier speeds too soon."""
 HIDDEN_PART: Final = 0.3
 """Speed of this module's clock, as a fraction of real time, while the board does not report the
 wheel's speed. The slow clock keeps earlier speeds for longer."""

@@ -69,8 +69,8 @@ SLOW_UNITS: Final = 20
 """Motor units of the server's speed SLOW, in backward drives (B) and in turns on the spot."""
 SETTING_REFUSED: Final = (
     "the server does not accept a speed for turns on the spot, so it makes all of them at its"
-    " own speed SLOW, which is faster than most commanded turns. `spin_speed: fixed` ends this"
-    " message (reported once)"
+    " own speed SLOW, which is faster than most commanded turns; set `spin_speed: fixed` if you"
+    " accept this speed (reported once)"
 )
 
 

@@ -197,12 +197,12 @@ class Sequence:
         time_s = now - self._delta_at + self._period_s
         in_time = (self._told + missing) * self._period_s <= time_s
         delta = self._delta if self._ahead is None else self._ahead
-        from_zero = self._from_zero(count, delta, elapsed_s)
         goes_on = passed == self._per_pose
         goes_on = goes_on or (in_time and missing * self._period_s > LONG_GAP_S)
         wrap = WRAP * self._per_pose
         off = (passed - counted) % wrap
-        if from_zero and not goes_on and min(off, wrap - off) > most_off:
+        jumped = not goes_on and min(off, wrap - off) > most_off
+        if jumped and self._from_zero(count, delta, elapsed_s):
             self._delta, self._ahead, self.ambiguous = delta, None, False
             return Step(0, None, restarted=True)
         if renewed or not in_time:

@@ -83,7 +83,7 @@ def test_a_long_period_is_written_four_times() -> None:
 
 
 def test_a_period_is_written_although_no_ticks_come() -> None:
-    """Another program has turned off the ticks, so no ticks can come between the rounds."""
+    """The driver writes the period of the tick reports although another program turned them off."""
     bench = Bench("firmware", own_periods=True)
     bench.run(1.0)
     bench.robot.receive(encode_command(SetPeriod(Stream.TICKS, PERIOD_OFF)), bench.now, 0)

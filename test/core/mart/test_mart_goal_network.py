@@ -198,9 +198,10 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 
 
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
-    """A first move of half the requested distance is not taken for an incomplete second run.
+    """The first move of a robot goes only half as far as requested, and the goal is kept.
 
-    The driver has not learned yet how far this robot drives.
+    A move that ran twice, and was stopped the second time, would look alike. But the driver has not
+    learned yet how far this robot drives, so it does not conclude this.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)

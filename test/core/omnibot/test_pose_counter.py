@@ -212,8 +212,8 @@ def reopened() -> Sequence:
 def test_the_pose_counter_also_tells_of_a_restart_while_the_port_was_closed() -> None:
     """The pose counter also shows a restart that happened while the port was closed.
 
-    The deltas' counter does not show it. By chance, its value 0 fits the last count and the elapsed
-    time.
+    The counter of the deltas does not show it: by chance, its value after the restart is the one
+    that a board without a restart would have sent.
     """
     sequence = reopened()
     after_s = 205 * 0.04 + 2.0

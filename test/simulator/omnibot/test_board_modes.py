@@ -130,7 +130,7 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A paused board reads the bytes of motion frames as letters: R resets it, and P starts it."""
+    """A paused board reads the bytes of motion frames as letters: R resets it, and P resumes it."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
     assert mode_of(board) is BoardMode.BOOTING
