@@ -83,7 +83,7 @@ def test_the_guard_keeps_the_last_packets_only_if_the_port_accepted_them(
 ) -> None:
     """A link ends without a proof of rest. If the port is full, the guard discards the old data.
 
-    If the port is not full, it may still hold the link's last packets. The guard keeps these.
+    If the port is not full, the link's last packets may still wait in it, and the guard keeps them.
     """
     ends: list[dict[str, bool]] = []
     end = Keeper.end

@@ -17,8 +17,8 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Speed in a curve, in m/s, below which the front board's line contains the speed 0. Few smaller
-numbers can be sent safely.
+"""Speed in a curve, in m/s, below which the front board gets the speed 0. For slower speeds, hardly
+any number stays harmless if the line is damaged.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004

@@ -67,9 +67,9 @@ SWINGING_M: Final = 0.055
 """Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks:
 ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
-"""Standard deviation, in m, of the additional errors of the robot's x and of its y after a wheel
-without counted ticks has rolled 1 m at an oscillating speed. The error ``SWINGING_M`` of the
-wheel's distance is added separately.
+"""Standard deviation, in m, of an error of the robot's x and of its y, for each 1 m that a wheel
+rolls at an oscillating speed while the board counts no ticks of it. ``SWINGING_M`` is the error of
+the wheel's distance.
 """
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviation of the distance that a wheel rolled while reports were lost, as a fraction of

@@ -161,9 +161,9 @@ FAST_TICKS = 30
 
 
 def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
-    """Return a ``Translation`` of the reports of two fast wheels.
+    """Return a ``Translation`` that has received the reports of two fast wheels.
 
-    Both wheels first roll forward by 20 reports of ``FAST_TICKS`` each. ``steps``: what each later
+    In each of the first 20 reports, both counts grow by ``FAST_TICKS``. ``steps``: what each later
     report adds to the counts of the left and the right wheel.
     """
     settings = LoisEcuSettings(wheel_radius_m=0.03, drive_mode="duty", duty_scale=100.0)

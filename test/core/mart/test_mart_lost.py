@@ -130,8 +130,8 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
     """The server's process stands still for 5 s while the robot is at rest. Then it works again.
 
-    The driver accepts commands again. It does not take the server's late answers to old queries for
-    replies to stops. Such replies would show that the stop port may hang.
+    The driver accepts commands again, although the server now answers old queries. Late replies to
+    stops would be different: they would show that the stop port may hang.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

@@ -285,10 +285,10 @@ def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
 def test_the_covariance_includes_a_change_that_is_carried_out_twice(
     command: tuple[float, float],
 ) -> None:
-    """If a change of the motors' units arrives twice, the covariance covers the resulting turn.
+    """A command that changes the motors' speeds is carried out twice, so the robot turns too far.
 
-    The robot drives backward, so nothing measures the turn. Only the server's second reply shows
-    that the change has arrived twice.
+    The covariance covers this turn. The robot drives backward, so nothing measures the turn. Only
+    the server's second reply shows that the command has arrived twice.
     """
     bench = MartBench("source").ready()
     inner, first = bench.robot.receive, []
