@@ -5,12 +5,20 @@
 import math
 
 import pytest
-from fejemis_bench import DRIVE, nominal
+from fejemis_bench import DRIVE, Bench, nominal
 from fejemis_drive import Drive, told
 
 from omnibot_driver.core.fejemis.messages import WheelSpeeds
 from omnibot_driver.core.fejemis.sums import with_sum
 from omnibot_driver.core.geometry.se2 import Pose
+
+
+def assert_right(bench: Bench) -> None:
+    """Assert that ``odom`` shows the true pose, within 2 cm and 0.02 rad."""
+    last, truth = bench.odometry[-1], bench.robot.truth
+    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
+    assert off.way_m < 0.02
+    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
@@ -41,10 +49,7 @@ def test_a_pose_set_to_zero_during_a_drive_does_not_move_the_odometry(
     bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
     bench.drive_on(v, w, 1.0)
     bench.run(1.5)
-    last, truth = bench.odometry[-1], bench.robot.truth
-    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
-    assert off.way_m < 0.02
-    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
+    assert_right(bench)
 
 
 def test_a_pose_set_to_zero_while_the_robot_brakes_hardly_moves_the_odometry() -> None:
@@ -129,10 +134,7 @@ def test_a_pose_set_to_zero_while_lines_wait_does_not_move_the_odometry(wait_s: 
     bench.run(wait_s)
     bench.robot.receive(with_sum(b"enc0") + b"\n", bench.now, DRIVE)
     bench.run(1.5)
-    last, truth = bench.odometry[-1], bench.robot.truth
-    off = Pose(truth.x_m, truth.y_m, truth.yaw_rad).way_to(last.pose)
-    assert off.way_m < 0.02
-    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.02
+    assert_right(bench)
 
 
 def test_a_pose_set_to_zero_at_rest_does_not_move_the_odometry() -> None:
