@@ -23,6 +23,7 @@ def view(**changes: Any) -> View:
         "state": "nominal",
         "estop": False,
         "estop_asked": False,
+        "releasable": True,
         "silent_s": 0.01,
         "imu": Flow(100.0, 0.01, (99, 100, 101)),
         "odom": Flow(25.0, 0.02, (25, 25, 25)),

@@ -82,11 +82,18 @@ def test_everything_fits_80_by_24(statuses: tuple[Status, ...]) -> None:
 
 
 def test_a_latched_estop_is_red() -> None:
-    """While the e-stop is latched, a red line names the key that releases it."""
+    """While the e-stop is latched, a red line names the key that releases it.
+
+    Until the driver's service is found, the key has no effect. So the line does not name it yet.
+    """
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
         assert "latched" not in app.query_one("#estop").classes
+        robot.shown = view(estop=True, releasable=False)
+        app.refresh_view()
+        await pilot.pause()
+        assert "E-STOP LATCHED  ·  waiting for the service that releases it" in screen(app)[1]
         robot.shown = view(estop=True)
         app.refresh_view()
         await pilot.pause()

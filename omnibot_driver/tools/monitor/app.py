@@ -166,7 +166,8 @@ class Monitor(App[None]):
         self._show_title(view)
         line = self._parts["estop"]
         line.set_class(bool(view.estop) or view.estop_asked, "latched")
-        line.update(text.estop(view) + ("  ·  R releases it" if view.estop else ""))
+        hint = "R releases it" if view.releasable else "waiting for the service that releases it"
+        line.update(f"{text.estop(view)}  ·  {hint}" if view.estop else text.estop(view))
         self._show_path(view)
         self._parts["figures"].update(Text("\n".join(text.figures(view))))
         self._show_verdicts(view)

@@ -110,7 +110,10 @@ class Feed:
         """Return the values to show now."""
         with self._lock:
             return self._model.view(
-                time.monotonic(), steers=self._velocity.steers, lacks=self._lacks()
+                time.monotonic(),
+                releasable=self._estop.service_is_ready(),
+                steers=self._velocity.steers,
+                lacks=self._lacks(),
             )
 
     def drivers(self) -> list[str]:
@@ -276,7 +279,7 @@ class Feed:
     def _call(self, client: Any, request: Any, what: str) -> None:
         if not client.service_is_ready():
             service = self._node.resolve_service_name(client.srv_name)
-            self.say(f"{what}: service {service} not found; is the driver running?")
+            self.say(f"{what}: service {service} not found; try again if the driver is running")
             return
         self.say(f"{what}: requested, no answer yet")
         client.call_async(request).add_done_callback(partial(self._answered, what))

@@ -57,6 +57,8 @@ class View:
 
     ``estop_asked``: whether the e-stop is requested, but not yet confirmed by the driver.
 
+    ``releasable``: whether the driver's service that releases the e-stop is found.
+
     ``silent_s``: time since the driver's last message.
 
     ``steers``: whether another node receives the monitor's commands.
@@ -70,6 +72,7 @@ class View:
     state: str
     estop: bool | None
     estop_asked: bool
+    releasable: bool
     silent_s: float
     imu: Flow
     odom: Flow
@@ -185,7 +188,12 @@ class Model:
         self._statuses, self._diagnosed_s, self._heard_s = statuses, now_s, now_s
 
     def view(
-        self, now_s: float, *, steers: bool = False, lacks: frozenset[str] = frozenset()
+        self,
+        now_s: float,
+        *,
+        releasable: bool = False,
+        steers: bool = False,
+        lacks: frozenset[str] = frozenset(),
     ) -> View:
         """Return the values to show now."""
         moves = self._commanded and now_s - self._commanded[1] < COMMAND_LIVES_S
@@ -198,6 +206,7 @@ class Model:
             state=self._state,
             estop=self._estop,
             estop_asked=self.estop_asked,
+            releasable=releasable,
             silent_s=now_s - self._heard_s,
             imu=imu,
             odom=odom,
