@@ -88,7 +88,7 @@ class Asking(Stops):
         else:
             # the left wheel, which has no encoder, may turn; the stops that the driver sends to a
             # lost server end this motion
-            self._lose(now, "the right wheel is at rest, but the server still reports a motion")
+            self._lose("the right wheel is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
         """Begin to stop a motion of unknown kind with the commands SRM and SM.

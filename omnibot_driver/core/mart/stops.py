@@ -192,7 +192,7 @@ class Stops(Ground, ABC):
             if self.motion is Motion.UNKNOWN and not self.greeted:
                 self._ask_what_moves(now)
                 return NO_PACKETS
-            self._lose(now)
+            self._lose()
             return self._repeat_lost(now)
         said = stopping.due(now)
         packets = self._send(said, now)
@@ -273,7 +273,7 @@ class Stops(Ground, ABC):
         unseen_s = max(0.0, stopping.began_s - counted_s)
         return self._turns.may_be_count(reply, unseen_s, self.conversation.trip_s)
 
-    def _lose(self, now: float, why: str = "") -> None:
+    def _lose(self, why: str = "") -> None:
         """Regard the server as lost, and report that once.
 
         A lost server does not answer stops, and may be moving the robot. Motion is refused.
