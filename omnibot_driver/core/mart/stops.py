@@ -209,11 +209,11 @@ class Stops(Ground, ABC):
         self._moved_by = None  # the move was cut short
         self.conversation.settle(now)
         assert stopping is not None
-        if stopping.motion is not Motion.UNKNOWN and stopping.rounds >= ROUNDS:
-            self.conversation.missed_s = now  # maybe a restart left a stop command unanswered
-        if Form.INTEGER in ANSWERS.get(stopping.motion, ()):
-            self.conversation.owes(Form.INTEGER, now)
         result, motion = stopping.result, stopping.motion
+        if motion is not Motion.UNKNOWN and stopping.rounds >= ROUNDS:
+            self.conversation.missed_s = now  # maybe a restart left a stop command unanswered
+        if Form.INTEGER in ANSWERS.get(motion, ()):
+            self.conversation.owes(Form.INTEGER, now)
         if result is None and motion is not Motion.UNKNOWN and not self.conversation.doubles(now):
             result = stopping.doubtful_result  # a repeated stop has found nothing to stop
         if stopping.move is not None and result is None:
@@ -230,7 +230,7 @@ class Stops(Ground, ABC):
         ):
             self.odometry.refused()
         self._rolled = result is not None and self._is_slow_stop(result, motion, now)
-        slow = result is not None and stopping.planned and self._rolled
+        slow = stopping.planned and self._rolled
         told = isinstance(result, Ok) and result.form is Form.INTEGER
         if motion is Motion.SPIN and (told or slow or result is None):
             uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)
