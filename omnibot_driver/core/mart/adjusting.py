@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.moves import Moves
 from omnibot_driver.core.mart.states import Motion, State
-from omnibot_driver.core.mart.stops import CREEP_MPS
+from omnibot_driver.core.mart.stop_reasons import CREEP_MPS
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 

@@ -28,14 +28,9 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
+from omnibot_driver.core.mart.stop_reasons import COASTS_S, HALF_STUCK, STUCK, STUCK_S
 from omnibot_driver.core.mart.stopping import REPEAT_S
-from omnibot_driver.core.mart.stops import (
-    COASTS_S,
-    HALF_STUCK,
-    LOST_REPEAT_S,
-    STUCK,
-    STUCK_S,
-)
+from omnibot_driver.core.mart.stops import LOST_REPEAT_S
 from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
