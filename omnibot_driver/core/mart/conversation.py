@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from omnibot_driver.core.mart.late_replies import LateReplies
 from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.replies import Fail, Ok, Other, Reply
 from omnibot_driver.core.mart.words import (
@@ -20,7 +21,6 @@ from omnibot_driver.core.mart.words import (
     NO_IMU,
     RMRA,
     UNSUPPORTED,
-    Form,
     Kind,
     Request,
     Word,
@@ -102,7 +102,7 @@ class Answer:
         return self.request.word
 
 
-class Conversation:
+class Conversation(LateReplies):
     """The exchange of requests and replies with one server.
 
     * ``delay_s``: longest time that a datagram may be on its way, in s.
@@ -115,16 +115,13 @@ class Conversation:
     """
 
     def __init__(self, delay_s: float) -> None:
-        self.delay_s = delay_s
+        super().__init__(delay_s)
         self.discarded = 0
-        self.connect()
 
     def connect(self) -> None:
         """Begin a new connection, and forget all earlier requests and replies."""
+        super().connect()
         self.pending: Pending | None = None
-        self._owed_until_s: dict[Form, float] = {}
-        self._copies_until_s: dict[Form, float] = {}
-        self._answers: dict[Word, tuple[Ok | Fail, float]] = {}
         self.trip_s = self.answered_trip_s = 0.0
         self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
@@ -137,39 +134,6 @@ class Conversation:
             return False
         return word.kind is not Kind.QUERY or word in PRESSING or not self._owed(word, now)
 
-    def heard(self, form: Form, now: float) -> None:
-        """Record that a reply with this form came. Its duplicate may come within ``delay_s``."""
-        self._copies_until_s[form] = now + self.delay_s
-
-    def answered(self, word: Word, reply: Ok, now: float) -> None:
-        """Record that ``reply`` is the answer to ``word``.
-
-        The caller has found this answer without the method ``hear``. The driver can now recognise a
-        later copy of the reply.
-        """
-        self._answers[word] = reply, now + self.delay_s
-
-    def came(self, reply: Ok, now: float) -> None:
-        """Record that ``reply`` is the late reply to an earlier request.
-
-        No other late reply of the same form is then expected. A copy of an earlier reply changes
-        nothing.
-        """
-        if not self._has_come(reply, now):
-            self._owed_until_s.pop(reply.form, None)
-
-    def certain_from_s(self, word: Word) -> float:
-        """Return the time from which ``word`` may be sent without confusion.
-
-        From this time on, no late reply can be mistaken for the reply to ``word``.
-        """
-        return max(map(self.late_until_s, word.forms)) - word.least_s
-
-    def late_until_s(self, form: Form) -> float:
-        """Return the time until which a late or duplicate reply with the form ``form`` may come."""
-        owed_s = self._owed_until_s.get(form, -math.inf)
-        return max(owed_s, self._copies_until_s.get(form, -math.inf))
-
     def disturbed(self, now: float) -> bool:
         """Return whether the network has recently lost, duplicated or delayed a datagram."""
         return now < self._disturbed_s + DISTURBED_S
@@ -177,22 +141,6 @@ class Conversation:
     def doubles(self, now: float) -> bool:
         """Return whether duplicate or late replies came recently."""
         return now < self._doubled_s + DISTURBED_S
-
-    def owes(self, form: Form, now: float) -> None:
-        """Record that a missing reply with the form ``form`` may still come, within ``delay_s``."""
-        until_s = now + self.delay_s
-        self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
-
-    def settle(self, now: float) -> None:
-        """Record that the server has answered the last request.
-
-        Missing replies to earlier requests come within ``delay_s`` from now, or are lost.
-        """
-        for form, until_s in self._owed_until_s.items():
-            self._owed_until_s[form] = min(until_s, now + self.delay_s)
-
-    def _owed(self, word: Word, now: float) -> bool:
-        return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
     def ask(self, request: Request, now: float, patience_s: float | None = None) -> Packets:
         """Return the packets with the request, and begin to wait for its reply.
@@ -282,30 +230,6 @@ class Conversation:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA
         before, _ = self._answers.get(word, (reply, now))
         return reply != before and self._has_come(reply, now, but=word, kinds=NUMBERS)
-
-    def _has_come(
-        self,
-        reply: Ok | Fail,
-        now: float,
-        *,
-        but: Word | None = None,
-        kinds: frozenset[Kind] = frozenset(Kind),
-    ) -> bool:
-        """Return whether a reply identical to ``reply`` came within the last ``delay_s``.
-
-        ``but``: a command; replies to this command are ignored. ``kinds``: the kinds of commands
-        whose replies are compared.
-        """
-        return isinstance(reply, Ok) and any(
-            each == reply and until_s > now and word is not but and word.kind in kinds
-            for word, (each, until_s) in self._answers.items()
-        )
-
-    def _owes_until(self, word: Word, sent_s: float) -> None:
-        """Record that the reply to ``word``, which was sent at ``sent_s``, may still come."""
-        until_s = sent_s + word.takes_s + 2 * self.delay_s
-        for form in word.forms:
-            self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def _patience_s(self, word: Word) -> float:
         """Return how long the driver waits for the reply to ``word``, in s.
