@@ -162,8 +162,8 @@ class MartBoard(Board):
         pilot = self._pilot
         if self._mode is not Mode.NOMINAL:
             return readings
-        if now >= self._told_s + 1.0 / self.settings.odom_rate_hz:
-            period_s = 1.0 / self.settings.odom_rate_hz
+        period_s = 1.0 / self.settings.odom_rate_hz
+        if now >= self._told_s + period_s:
             self._told_s = max(self._told_s + period_s, now - period_s / 2)
             readings.append(pilot.told(now))
         if pilot.busy(now) and now >= self._expected_s + EXPECTED_EVERY_S:
