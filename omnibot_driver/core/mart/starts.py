@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The start of motions: a new check of the IMU, then the start command.
+"""The start of motions, and of jobs.
 
 This module knows the wanted motion and the start commands; it does not know when a motion must end.
 The caller passes the time.
@@ -12,13 +12,8 @@ from typing import Final
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.conversation import SLOW_S, Answer
-from omnibot_driver.core.mart.failed_starts import AGAIN_S, FailedStarts
-from omnibot_driver.core.mart.ground import (
-    ESTOP_REPEAT_S,
-    GAP_LONGEST_S,
-    GREET_S,
-    STARTS_UP_S,
-)
+from omnibot_driver.core.mart.ground import ESTOP_REPEAT_S, GREET_S, STARTS_UP_S
+from omnibot_driver.core.mart.imu_checks import ImuChecks
 from omnibot_driver.core.mart.jobs import RECORD_S, Job
 from omnibot_driver.core.mart.replies import Fail
 from omnibot_driver.core.mart.required_motion import is_turn_ramped
@@ -49,7 +44,7 @@ STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 """Longest duration of a controlled move: 3 s, plus this time in s for each inch or degree."""
 
 
-class Starts(FailedStarts):
+class Starts(ImuChecks):
     """The part of the class ``Pilot`` that starts motions."""
 
     def _act(self, now: float) -> Packets:
@@ -169,49 +164,6 @@ class Starts(FailedStarts):
             units = self.loop.first_units(twist.vx_mps, twist.yaw_rate_radps)
             return words.RM.request(units)
         return words.B.request("SLOW")
-
-    def _check(self, now: float) -> Packets:
-        """Return the request that checks the IMU; no packets while it must wait.
-
-        Reasons to wait:
-
-        * The check is not due.
-        * A late reply could be mistaken for the reply to the check.
-        * After a short silence, no heading shows yet whether the server was restarted.
-        """
-        word = self.imu.word
-        if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
-            return NO_PACKETS
-        waits = self.odometry.heading.told_s < self._gap_s and now < self._gap_s + GAP_LONGEST_S
-        if waits or self._is_quiet(now):
-            return NO_PACKETS
-        self._require(word)
-        self.state = State.CHECKING
-        if word is words.CHECK:
-            self.odometry.wheel.may_begin_anew = True
-        return self._ask(self.imu.request, now)
-
-    def _checked(self, answer: Answer, now: float) -> None:
-        self.state = State.STILL
-        reply, was_dead = answer.reply, self.imu.dead
-        if self.imu.answered(answer.word, reply, answer.took_s, now):
-            if self.imu.dead and not was_dead:
-                self.jobs.cancel(self.health.refusal)
-                self._notice(self.health.refusal, halt=True)
-            if self.imu.word is not answer.word:
-                self.imu.again_s = now + self._delay_s  # a copy may look like the next reply
-            return
-        self._again_s = self.imu.again_s = now + AGAIN_S
-        reason = reply.reason if isinstance(reply, Fail) else ""
-        why = f"the check of the IMU failed: {reason or 'the server gives no reason'}"
-        if reason == words.CONFLICT:
-            why += "; look for another program that commands the robot"
-            self.jobs.cancel(why)
-            self._switch_off.refused()
-            self.motion = Motion.UNKNOWN
-            self._halt(now, why)
-        else:
-            self._notice(why, halt=True)
 
     def _begin(self, start: Request, now: float) -> Packets:
         self._require(start.word)
