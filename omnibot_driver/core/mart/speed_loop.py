@@ -7,11 +7,11 @@ does not know commands. The caller passes the time.
 """
 
 import math
-from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
-from omnibot_driver.core.mart.motor_line import MOST_DEAD, MotorLine
+from omnibot_driver.core.mart.driven_wheel import DrivenWheel
+from omnibot_driver.core.mart.motor_line import MOST_DEAD
 from omnibot_driver.core.mart.motors import MOST_UNITS, UNEQUAL, Motors
 from omnibot_driver.core.mart.settings import MartSettings
 
@@ -48,8 +48,6 @@ LEARN_TRIPS, LESS_PER_S = 4, 10.0
 ``LESS_PER_S``: the standard deviation of a measured speed is multiplied by
 ``1 + LESS_PER_S * trip_s``.
 """
-SLOWEST_MPS: Final = 0.015
-"""Measured wheel speed in m/s above which a wheel is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
 """Lowest wheel speed in m/s with which the driver starts RM (forward).
 
@@ -77,27 +75,6 @@ of the set-point, is added to the relative variance of the ratio.
 """
 
 
-@dataclass(slots=True)
-class _Side:
-    """One motor, and the wheel that it turns.
-
-    * ``stood_s``: time in s for which the wheel has not turned, although the motor has enough
-      units.
-    * ``window_units_s``: sum of units * seconds in the averaging window.
-    * ``window_m``: distance in m in the averaging window.
-    """
-
-    line: MotorLine
-    units: int = 0
-    stood_s: float = 0.0
-    window_units_s: float = 0.0
-    window_m: float = 0.0
-
-    def wanted_units(self, speed: float) -> int:
-        """Return the units for ``speed`` (in nominal units); zero if ``speed`` is not positive."""
-        return round(min(MOST_UNITS, max(0.0, self.line.units(speed)))) if speed > 0.0 else 0
-
-
 class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
@@ -109,7 +86,7 @@ class SpeedLoop(Motors):
     def __init__(self, settings: MartSettings) -> None:
         super().__init__(settings)
         self.trip_s = 0.0
-        self._right, self._left = _Side(self._right_line), _Side(self._left_line)
+        self._right, self._left = DrivenWheel(self._right_line), DrivenWheel(self._left_line)
         self._least_units = LEAST_UNITS
         self._balance_is_measured = False
         self.begin(0, False, 0.0)
@@ -241,14 +218,14 @@ class SpeedLoop(Motors):
             side.window_m += self._direction * (way_m + turned_rad * out_m)
         if self._window_s >= LEARN_S + LEARN_TRIPS * self.trip_s:
             self._judge_missed(right_only=right_only)
-            before = self._right.line.slope, self._right.line.offset
-            self._learn(self._right)
+            doubt = 1.0 + LESS_PER_S * self.trip_s
+            line = self._right.line
+            slope, offset = line.slope, line.offset
+            self._right.learn(self._window_s, self.per_unit_mps, doubt)
             if right_only:
-                self._left.line.move(
-                    self._right.line.slope - before[0], self._right.line.offset - before[1]
-                )
+                self._left.line.move(line.slope - slope, line.offset - offset)
             else:
-                self._learn(self._left)
+                self._left.learn(self._window_s, self.per_unit_mps, doubt)
                 self._balance_is_measured = True
             self._clear(now)
 
@@ -258,35 +235,25 @@ class SpeedLoop(Motors):
         The driver assumes the combination of arrived and lost changes that fits the measured speeds
         best.
         """
+        seconds, per_unit_mps = self._window_s, self.per_unit_mps
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:
             lost = [each for each, came in zip(self._missed, arrived, strict=True) if not came]
             return sum(right for right, _ in lost), sum(left for _, left in lost)
 
-        def off(side: _Side, less: int) -> float:
-            expected = side.line.speed(side.window_units_s / self._window_s - less)
-            return side.window_m / self._window_s / self.per_unit_mps - max(0.0, expected)
-
         def error(lacking: tuple[int, int]) -> float:
             right, left = lacking
-            return off(self._right, right) ** 2 + (0 if right_only else off(self._left, left) ** 2)
+            square = self._right.error(right, seconds, per_unit_mps) ** 2
+            if right_only:
+                return square
+            return square + self._left.error(left, seconds, per_unit_mps) ** 2
 
         every = product((True, False), repeat=len(self._missed))
         best = min((lacks(arrived) for arrived in every), key=error)
         for side, less in zip((self._right, self._left), best, strict=True):
             side.units -= less
-            side.window_units_s -= less * self._window_s
+            side.window_units_s -= less * seconds
         self._missed.clear()
-
-    def _learn(self, side: _Side) -> None:
-        units = side.window_units_s / self._window_s
-        speed = side.window_m / self._window_s / self.per_unit_mps
-        slowest = SLOWEST_MPS / self.per_unit_mps
-        should_turn = units < MOST_DEAD and side.line.speed(units) > slowest
-        must_turn = units >= MOST_DEAD and side.line.speed(units) > 2 * slowest
-        side.stood_s = side.stood_s + self._window_s if must_turn and speed < slowest else 0.0
-        if speed > slowest or should_turn:  # else nothing is learned from a wheel at rest
-            side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
         """Return the changes of the right and the left motor's units, or None if both are zero.
@@ -314,12 +281,10 @@ class SpeedLoop(Motors):
         """Record that a change of the motors' units was sent. The motors are assumed to obey it."""
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
         self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
-        before = self._right.units, self._left.units
-        self._right.units = min(MOST_UNITS, max(0, self._right.units + right))
-        self._left.units = min(MOST_UNITS, max(0, self._left.units + left))
-        self._change = self._right.units - before[0], self._left.units - before[1]
-        again = self._right.units + right, self._left.units + left  # if it arrives twice
-        wrong = self._ratio(*(min(MOST_UNITS, max(1, units)) for units in again))
+        self._change = self._right.change(right), self._left.change(left)
+        sides = (self._right, right), (self._left, left)
+        again = [min(MOST_UNITS, max(1, side.units + more)) for side, more in sides]
+        wrong = self._ratio(*again)  # if the change arrives twice
         self._copy = max(self._copy, abs(wrong - self.left_over_right))
         if max(abs(right), abs(left)) >= LARGE_UNITS:
             self._clear(now + SETTLE_S)
