@@ -267,14 +267,12 @@ class SpeedLoop(Motors):
         held_radps = rate_radps + HOLD_PER_S * self._error_rad
         right_mps, left_mps = self.sides(speed_mps, self._direction * held_radps)
         most = MOST_BACKWARD if self._direction < 0.0 and self._is_slow else MOST_CHANGE
-        sides = (self._right, right_mps), (self._left, left_mps)
-        wanted = [side.wanted_units(mps / self.per_unit_mps) for side, mps in sides]
-        if not any(wanted):  # zero units on both sides would end the motion
-            wanted = [int(mps == max(right_mps, left_mps)) for _, mps in sides]
-        right, left = (
-            max(-most, min(most, units - side.units))
-            for units, (side, _) in zip(wanted, sides, strict=True)
-        )
+        right = self._right.wanted_units(right_mps / self.per_unit_mps)
+        left = self._left.wanted_units(left_mps / self.per_unit_mps)
+        if not (right or left):  # zero units on both sides would end the motion
+            right, left = int(right_mps >= left_mps), int(left_mps >= right_mps)
+        right = max(-most, min(most, right - self._right.units))
+        left = max(-most, min(most, left - self._left.units))
         return (right, left) if right or left else None
 
     def changed(self, right: int, left: int, now: float) -> None:
