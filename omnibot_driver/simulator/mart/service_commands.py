@@ -26,6 +26,10 @@ BIAS_SAMPLES = 50
 NO_READ = 255
 
 Handler = Callable[["MartServer", str], str | None]
+"""Function that executes a command.
+
+It returns the reply, or None if the reply comes later or never.
+"""
 
 
 def missing(server: "MartServer", what: str) -> str | None:
