@@ -15,7 +15,7 @@ from omnibot_driver.simulator.mart.motion import Kind
 from omnibot_driver.simulator.mart.settings import MartSettings
 from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then, Waiter
 
-QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
+QUEUE_LENGTH, REMEMBERED = 256, 10_000
 QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
 """``BOOT_S``: time in s from a restart of the program until its ports are open.
@@ -204,8 +204,7 @@ class MartServer(ServerState):
 
     def send(self, data: bytes) -> None:
         """Send a datagram to the sender of the command in progress."""
-        if self.log is not None and len(self.log) < LOG_LINES:
-            self.log.append(f"{self.date} {data[:49].decode('latin-1')}")
+        self.write_log(data[:49].decode("latin-1"))
         self._out.append(Reply(self.now_s, COMMAND, self._sender, data))
 
     def done(self) -> None:
@@ -291,8 +290,7 @@ class MartServer(ServerState):
             text = wire.text_of(datagram)
             self.busy = True
             self.executed.append(text)
-            if self.log is not None and len(self.log) < LOG_LINES:
-                self.log.append(f"{self.date} {text}")
+            self.write_log(text)
             answer = commands.execute(self, text)
             if answer is not None:
                 self.later(QUICK_S, MartServer.answer, answer)

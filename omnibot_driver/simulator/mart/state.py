@@ -24,7 +24,7 @@ FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
 """Time in s that the server adds to a negative duration, because the server counts ms in an
 unsigned number."""
-FILES = 100
+FILES, LOG_LINES = 100, 10_000
 
 Then = Callable[..., None]
 
@@ -135,6 +135,11 @@ class ServerState:
         if len(self.files) > FILES:
             del self.files[next(iter(self.files))]
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
+
+    def write_log(self, text: str) -> None:
+        """Add a dated line to the log, if the log is open and not full."""
+        if self.log is not None and len(self.log) < LOG_LINES:
+            self.log.append(f"{self.date} {text}")
 
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
         """Return the reading that a sonar had ``ago_s`` seconds ago, in inches.
