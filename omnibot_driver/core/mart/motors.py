@@ -107,6 +107,13 @@ class Motors:
         units = max(units, BALANCE_UNITS)
         return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
+    def _ratio(self, right: int, left: int) -> float:
+        """Return the expected ratio of left to right wheel speed at these motor units."""
+        if not right:
+            return 1.0
+        equal = self._mean_speed(left) / max(1.0, self._mean_speed(right))
+        return equal * self._balance(max(right, left))
+
     def _mean_speed(self, units: float) -> float:
         """Return the mean speed of both motors when each motor has ``units`` motor units.
 

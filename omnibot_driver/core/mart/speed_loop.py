@@ -161,12 +161,6 @@ class SpeedLoop(Motors):
         """
         return self._ratio(self._right.units, self._left.units)
 
-    def _ratio(self, right: int, left: int) -> float:
-        if not right:
-            return 1.0
-        equal = self._mean_speed(left) / max(1.0, self._mean_speed(right))
-        return equal * self._balance(max(right, left))
-
     @property
     def balance(self) -> float:
         """Expected ratio of left to right motor speed if both motors have ``units``.
