@@ -204,10 +204,8 @@ class SpeedLoop(Motors):
         if now - seconds < self._window_from_s:
             return
         self._window_s += seconds
-        for side, out_m in (
-            (self._right, self.settings.track_m / 2),
-            (self._left, -self.settings.track_m / 2),
-        ):
+        half_m = self.settings.track_m / 2
+        for side, out_m in ((self._right, half_m), (self._left, -half_m)):
             side.window_units_s += side.units * seconds
             side.window_m += self._direction * (way_m + turned_rad * out_m)
         if self._window_s >= LEARN_S + LEARN_TRIPS * self.trip_s:
