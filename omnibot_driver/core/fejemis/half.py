@@ -14,7 +14,6 @@ from omnibot_driver.core.fejemis.decoder import DecoderStatistics, FejemisDecode
 from omnibot_driver.core.fejemis.messages import (
     BoardPose,
     Comment,
-    Distance,
     Heartbeat,
     Message,
 )
@@ -279,27 +278,3 @@ class Half:
         self.clock.begin()
         self.subscribe_again()
         self._unsure_at = None  # the caller configures the board again
-
-
-def keyword_of(message: Message) -> str:
-    """Return the keyword of the message's stream.
-
-    The result is empty for a heartbeat, and for a message that belongs to no stream.
-    """
-    if isinstance(message, Distance):
-        return message.keyword
-    return _KEYWORDS.get(type(message).__name__, "")
-
-
-_KEYWORDS: Final = {
-    "FrontAngle": "fwl",
-    "BoardPose": "pose",
-    "WheelSpeeds": "vel",
-    "Gyro": "gyro",
-    "Acceleration": "acc",
-    "Magnetic": "mag",
-    "Attitude": "imupose",
-    "Battery": "bat",
-    "Infrared": "ir",
-    "SteeringConfiguration": "confs",
-}

@@ -5,8 +5,8 @@
 from collections.abc import Callable
 
 from omnibot_driver.core.board import Mode
-from omnibot_driver.core.fejemis.half import Half, keyword_of
-from omnibot_driver.core.fejemis.messages import FrontAngle, Heartbeat, Message
+from omnibot_driver.core.fejemis.half import Half
+from omnibot_driver.core.fejemis.messages import FrontAngle, Heartbeat, Message, keyword_of
 from omnibot_driver.core.fejemis.obedience import Obedience
 from omnibot_driver.core.fejemis.ports import Ports
 from omnibot_driver.core.fejemis.told import Told

@@ -6,6 +6,7 @@ Units are the boards': m, m/s, m/s², s, µT, V, A. Angles are in degrees or rad
 """
 
 from dataclasses import dataclass
+from typing import Final
 
 from omnibot_driver.core.values import value
 
@@ -212,3 +213,26 @@ Message = (
     | Words
     | Comment
 )
+
+_KEYWORDS: Final[dict[type, str]] = {
+    FrontAngle: "fwl",
+    BoardPose: "pose",
+    WheelSpeeds: "vel",
+    Gyro: "gyro",
+    Acceleration: "acc",
+    Magnetic: "mag",
+    Attitude: "imupose",
+    Battery: "bat",
+    Infrared: "ir",
+    SteeringConfiguration: "confs",
+}
+
+
+def keyword_of(message: Message) -> str:
+    """Return the keyword of the message's stream.
+
+    The result is empty for a heartbeat, and for a message that belongs to no stream.
+    """
+    if isinstance(message, Distance):
+        return message.keyword
+    return _KEYWORDS.get(type(message), "")
