@@ -35,6 +35,11 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 The driver never requests ``confs`` with the line ``confsi``: if ``confsi`` lost its last letter,
 the board would set its geometry to zero.
 """
+SUBSCRIPTIONS: Final = {
+    role: {key: f"sub {key} {period}" for key, period in streams.items()}
+    for role, streams in STREAMS.items()
+}
+"""For each board and stream: the line that subscribes to it."""
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
 TOGETHER: Final = ("gyro", "acc")
@@ -137,8 +142,8 @@ class Half:
         """Streams that the firmware does not know."""
         if self.role is None:
             return []
-        streams = STREAMS[self.role]
-        return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
+        lines = SUBSCRIPTIONS[self.role]
+        return [key for key, text in lines.items() if text in self.unknown_words]
 
     def not_understood(self, now: float) -> bool:
         """Return whether more than ``MANY`` lines were damaged or unknown in the current second.
@@ -185,25 +190,23 @@ class Half:
         self._next_at = now + AGAIN_S
         if self.role is None or self.heartbeat is None:
             return [b"hbti"]
-        wanted = {
-            key: period
-            for key, period in STREAMS[self.role].items()
-            if now - self.came_at(key) > max(AGAIN_S, 4e-3 * period)
-            and key not in self.unknown_streams
-        }
-        if wanted.keys() & set(TOGETHER):
-            wanted |= {key: STREAMS["drive"][key] for key in TOGETHER}
-        texts = [f"sub {key} {period}".encode("ascii") for key, period in wanted.items()]
+        lines, unknown = SUBSCRIPTIONS[self.role], self.unknown_streams
         if not self._left:
             self._left = True  # subscriptions of another program would use up the bandwidth
-            every = (f"sub {key} {period}" for key, period in STREAMS[self.role].items())
-            return [b"leave", *(text.encode("ascii") for text in every)]
-        if NEEDED[self.role] in wanted and not self.unsure:
+            return [b"leave", *(text.encode("ascii") for text in lines.values())]
+        wanted = [
+            key
+            for key, period in STREAMS[self.role].items()
+            if now - self.came_at(key) > max(AGAIN_S, 4e-3 * period) and key not in unknown
+        ]
+        if any(key in wanted for key in TOGETHER):
+            wanted += [key for key in TOGETHER if key not in wanted]
+        needed = NEEDED[self.role]
+        if needed in wanted and not self.unsure:
             self._unsure_at, self._ask_at = now, now
-        needed, is_slow = NEEDED[self.role], self._is_slow(now)
-        if is_slow and not {*wanted, *self.unknown_streams} & {needed}:
-            texts.append(f"sub {needed} {STREAMS[self.role][needed]}".encode("ascii"))
-        return texts
+        if self._is_slow(now) and needed not in (*wanted, *unknown):
+            wanted.append(needed)
+        return [lines[key].encode("ascii") for key in wanted]
 
     def _is_slow(self, now: float) -> bool:
         """Return whether the stream that driving requires is much slower than its subscription.
