@@ -321,9 +321,9 @@ class MotionFilter:
     # Time
 
     def _step(self, dt: float) -> None:
-        variances = {wheel.base: [(wheel.base + HELD, 1.0)] for wheel in self.wheels}
         unsure = {
-            base: math.sqrt(self.filter.variance_of(held)) for base, held in variances.items()
+            wheel.base: math.sqrt(self.filter.variance_of([(wheel.base + HELD, 1.0)]))
+            for wheel in self.wheels
         }
         step = Step(dt, list(self.filter.mean), unsure)
         before = (self.speed_mps(0), self.speed_mps(1))
