@@ -54,7 +54,7 @@ class BoardKind:
         if appended and not self.appends:
             self.appends, motion.holds = True, True
             motion.signed = self._seen_signed
-            motion.begin_excess()
+            motion.speed_errors.begin_excess()
             for wheel in motion.wheels:
                 wheel.course.step_s = FIRMWARE_STEP_S
         elif not (appended or self.appends or self._seen_unsigned):

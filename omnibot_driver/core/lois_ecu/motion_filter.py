@@ -7,13 +7,13 @@ robot's.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 from omnibot_driver.core.lois_ecu.filter_history import FilterHistory
 from omnibot_driver.core.lois_ecu.filter_variances import pose_covariance, twist_variances
 from omnibot_driver.core.lois_ecu.measured_speed import measure_speeds
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
+from omnibot_driver.core.lois_ecu.speed_errors import EXCESS_CHANGE, ROUNDED, SpeedErrors
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
     BIAS,
@@ -46,24 +46,6 @@ ROLLED_OUT_S: Final = 0.15
 LATE_PART: Final = 0.6
 """Assumed standard deviation of the time at which a command takes effect, as a fraction of the
 speed controller's period."""
-ROUNDED: Final = 0.4
-ROUNDED_STDDEV: Final = 0.15
-"""Standard deviation of the amount by which the firmware rounds down a speed, in RPM.
-
-``ROUNDED``: mean of this amount.
-"""
-# While a wheel rolls backward, the firmware lowers the target with each tick until the controller's
-# next step. A feed-forward may make the wheel much faster still.
-EXCESS_MEAN: Final = (0.1, 0.1)
-EXCESS_STDDEV: Final = (0.02, 0.3)
-EXCESS_CHANGE: Final = (0.0, 0.15)
-"""Standard deviation that is added to a wheel's excess when its set-point changes.
-
-The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
-``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess. In each of the three
-constants, the first value is for the board's own controller gains, the second for the user's gains.
-"""
-DUTY_STDDEV: Final = 0.3
 ROLLS_S: Final = 0.1
 """Standard deviation of the distance that a wheel rolls after an RPM set-point has taken its power
 away, in m per m/s. Motors and friction are unknown.
@@ -100,7 +82,7 @@ class MotionFilter:
         While both speeds are equal, the public firmware does not update its position. So after a
         small difference, the board's distance may be too short.
         """
-        self._kinds: tuple[str, str] | None = None
+        self.speed_errors = SpeedErrors(self)
         self.history = FilterHistory(self.filter)
 
     @property
@@ -166,8 +148,7 @@ class MotionFilter:
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
             return
-        if self._kinds and "duty" in self._kinds:
-            self._kinds = None  # the restored biases may be those of RPM set-points
+        self.speed_errors.restored()
         # A restarted board does not drive, so the wheels coast. Signed counts restart at zero and
         # show how far. Otherwise the distance is estimated.
         powered_s = max(min(then_s - kept_s, LONGEST_STEP_S), 0.0)
@@ -270,45 +251,7 @@ class MotionFilter:
             if wheel.course.kind == "duty" and wheel.course.target_mps * speed < 0:
                 late_m = math.hypot(late_m, REVERSES_S * speed)
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)
-        kinds = (self._kind(0), self._kind(1))
-        if kinds != self._kinds:
-            earlier, self._kinds = self._kinds or ("", ""), kinds
-            self._begin_biases([index for index in (0, 1) if kinds[index] != earlier[index]])
-
-    def _kind(self, index: int) -> str:
-        """Return the kind of the command that a wheel follows: "rpm", "duty" or "stop".
-
-        A Stop after a duty command is also of the kind "duty", because it does not change the error
-        of the speed.
-        """
-        course = self.wheels[index].course
-        driven = course.target_mps or (self._kinds and self._kinds[index] == "duty")
-        return course.kind if course.kind == "rpm" or driven else "stop"
-
-    def _begin_biases(self, wheels: Sequence[int]) -> None:
-        """Reset the speed errors (biases) of these wheels, whose kind of command has changed.
-
-        In duty mode, a bias is a relative error. In other modes, a bias is the amount in m/s by
-        which the firmware rounds down a speed.
-        """
-        assert self._kinds is not None
-        for index in wheels:
-            if self._kinds[index] == "duty":
-                self.filter.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
-            else:
-                spread = ROUNDED_STDDEV * self.rpm_mps
-                self.filter.forget(BIAS + index, ROUNDED * self.rpm_mps, spread**2)
-        self.begin_excess()
-
-    def begin_excess(self) -> None:
-        """Reset the excess of each wheel.
-
-        The excess is the fraction by which a wheel that rolls backward exceeds its set-point.
-        """
-        for index in (0, 1):
-            mean = EXCESS_MEAN[self.tuned] if self.holds else 0.0
-            stddev = EXCESS_STDDEV[self.tuned] if self.holds else 0.0
-            self.filter.forget(EXCESS + index, mean, stddev**2)
+        self.speed_errors.follow()
 
     def _target(self, wheel: Wheel) -> float:
         target = wheel.course.target_mps

@@ -79,7 +79,7 @@ class LoisOdometry:
         tuned = not own_gains(settings)
         if tuned is not motion.tuned:
             motion.tuned = tuned
-            motion.begin_excess()
+            motion.speed_errors.begin_excess()
         motion.turn_sign = -1.0 if settings.inverted else 1.0
         motion.yaw0_rad += yaw_rad - motion.yaw_rad
         self._board = OdometryReader(settings.track_m, settings.rim_mps_per_rpm)

@@ -1,0 +1,91 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Assumed errors of the speed that a wheel has under its set-point, as states of the motion filter.
+
+The errors depend on the kind of the command that the wheel follows.
+"""
+
+from typing import TYPE_CHECKING, Final
+
+from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, EXCESS
+
+if TYPE_CHECKING:
+    from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
+
+ROUNDED: Final = 0.4
+ROUNDED_STDDEV: Final = 0.15
+"""Standard deviation of the amount by which the firmware rounds down a speed, in RPM.
+
+``ROUNDED``: mean of this amount.
+"""
+# While a wheel rolls backward, the firmware lowers the target with each tick until the controller's
+# next step. A feed-forward may make the wheel much faster still.
+EXCESS_MEAN: Final = (0.1, 0.1)
+EXCESS_STDDEV: Final = (0.02, 0.3)
+EXCESS_CHANGE: Final = (0.0, 0.15)
+"""Standard deviation that is added to a wheel's excess when its set-point changes.
+
+The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
+``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess. In each of the three
+constants, the first value is for the board's own controller gains, the second for the user's gains.
+"""
+DUTY_STDDEV: Final = 0.3
+
+
+class SpeedErrors:
+    """The bias and the excess of both wheels in the motion filter ``motion``.
+
+    In duty mode, a bias is a relative error. In other modes, a bias is the amount in m/s by which
+    the firmware rounds down a speed.
+    """
+
+    def __init__(self, motion: "MotionFilter") -> None:
+        self._motion = motion
+        self._kinds: tuple[str, str] | None = None
+        """For each wheel, the kind of the command that it follows: "rpm", "duty" or "stop"."""
+
+    def restored(self) -> None:
+        """Record that the filter has gone back to an earlier state.
+
+        After a duty command, the restored biases may be those of RPM set-points.
+        """
+        if self._kinds and "duty" in self._kinds:
+            self._kinds = None
+
+    def follow(self) -> None:
+        """Reset the bias of each wheel whose kind of command has changed, and then each excess.
+
+        A Stop after a duty command does not change the kind, because it does not change the error
+        of the speed.
+        """
+        before = self._kinds or ("", "")
+        left, right = [
+            wheel.course.kind
+            if wheel.course.kind == "rpm" or wheel.course.target_mps or kind == "duty"
+            else "stop"
+            for wheel, kind in zip(self._motion.wheels, before, strict=True)
+        ]
+        if (left, right) == self._kinds:
+            return
+        self._kinds = left, right
+        estimate, rpm_mps = self._motion.filter, self._motion.rpm_mps
+        for index, (kind, earlier) in enumerate(zip(self._kinds, before, strict=True)):
+            if kind == earlier:
+                continue
+            if kind == "duty":
+                estimate.forget(BIAS + index, 0.0, DUTY_STDDEV**2)
+            else:
+                spread = ROUNDED_STDDEV * rpm_mps
+                estimate.forget(BIAS + index, ROUNDED * rpm_mps, spread**2)
+        self.begin_excess()
+
+    def begin_excess(self) -> None:
+        """Reset the excess of each wheel.
+
+        The excess is the fraction by which a wheel that rolls backward exceeds its set-point.
+        """
+        motion = self._motion
+        for index in (0, 1):
+            mean = EXCESS_MEAN[motion.tuned] if motion.holds else 0.0
+            stddev = EXCESS_STDDEV[motion.tuned] if motion.holds else 0.0
+            motion.filter.forget(EXCESS + index, mean, stddev**2)
