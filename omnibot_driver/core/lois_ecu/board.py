@@ -6,7 +6,6 @@ Between two tick reports of the board, the adapter predicts the odometry.
 """
 
 import math
-from typing import Final
 
 from omnibot_driver.core.board import Board, BoardFigures, Mode
 from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
@@ -21,11 +20,10 @@ from omnibot_driver.core.lois_ecu.messages import (
     RecordKind,
     SetLed,
     TerminalLine,
-    Ticks,
 )
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
-from omnibot_driver.core.lois_ecu.reset_proof import ResetProof
+from omnibot_driver.core.lois_ecu.repeated_reset import RESETS, RepeatedReset
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.core.lois_ecu.traits import TRAITS
 from omnibot_driver.core.packets import NO_PACKETS, Packets, joined, packed
@@ -36,18 +34,7 @@ from omnibot_driver.core.readings import (
     ExtraReading,
     OdometryReading,
     Reading,
-    ResetReading,
 )
-
-RESETS: Final = 8
-RESET_AGAIN_S: Final = 1.1
-"""Time in s after which a reset is repeated. Stopped wheels come to rest in this time, and two tick
-reports arrive.
-"""
-STEADY_S: Final = 0.3
-"""Time in s without a change of the tick counts after which the wheels are regarded as at rest.
-After a boot, the report period is 0.4 s, so one unchanged report is enough.
-"""
 
 
 class LoisEcuBoard(Board):
@@ -57,20 +44,13 @@ class LoisEcuBoard(Board):
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._ecu = LoisConversation(settings)
+        self._reset = RepeatedReset(self._ecu)
         self._proof = StopProof(TRAITS.stands_after_s)
         self._once: Packets = NO_PACKETS
         self._rolled = Pose()
         self._leaving = False
-        self._connect()
-
-    def _connect(self) -> None:
         self._odometry_at = -math.inf
         self._sensor_speaks = False  # lines instead of ticks, in a terminal mode
-        self._reset_proof: ResetProof | None = None
-        self._reset_seen: Ticks | None = None
-        self._resets_left = 0
-        self._reset_at_s = math.inf
-        self._reset_shown = False
 
     @property
     def settings(self) -> LoisEcuSettings:
@@ -81,8 +61,7 @@ class LoisEcuBoard(Board):
     def settings(self, settings: LoisEcuSettings) -> None:
         if settings != self._ecu.settings:
             self._ecu.settings = settings
-            if self._reset_proof is not None:
-                self._reset_proof.ticks_per_revolution = settings.ticks_per_revolution
+            self._reset.configure(settings.ticks_per_revolution)
 
     @property
     def mode(self) -> Mode:
@@ -122,7 +101,8 @@ class LoisEcuBoard(Board):
         """Begin a new connection. The settings are then written to the board again."""
         self._ecu.connect()
         self._once = NO_PACKETS
-        self._connect()
+        self._odometry_at, self._sensor_speaks = -math.inf, False
+        self._reset.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode ``data``, and return the readings that its bytes complete.
@@ -183,19 +163,7 @@ class LoisEcuBoard(Board):
                 case _:
                     self._sensor_speaks |= isinstance(reading, TerminalLine)
                     readings.append(ExtraReading(reading))
-        return readings + self._shown_reset()
-
-    def _shown_reset(self) -> list[Reading]:
-        proof, known = self._reset_proof, self._ecu.translation.counts
-        if proof is None or known.last is None or known.last is self._reset_seen:
-            return []
-        self._reset_seen, now = known.last, known.came_at_s
-        if not proof.look(known.last, now):
-            return []
-        if not self._reset_shown:
-            self._reset_shown, self._reset_at_s = True, math.inf
-            self._ecu.write_settings(now)
-        return [ResetReading(proof.remark)]
+        return readings + self._reset.readings()
 
     def _tangent(self, fused: FusedOdometry) -> Pose:
         """Return how far the robot moved forward (m) and turned (rad) since the last estimate."""
@@ -222,7 +190,7 @@ class LoisEcuBoard(Board):
         if self._leaving:
             return self._odometry_due_at
         once_at = -math.inf if self._once else math.inf
-        return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset_at_s)
+        return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset.again_at_s)
 
     def leave(self) -> None:
         """Make ``due`` return nothing from now on. So no line follows the driver's last Stop."""
@@ -238,9 +206,8 @@ class LoisEcuBoard(Board):
             return NO_PACKETS
         once, self._once = self._once, NO_PACKETS
         data = self._ecu.due(now, proved=self._proof.proved)
-        if now >= self._reset_at_s:
-            data += joined(self._reset())
-            self._say_reset_again(now)
+        if now >= self._reset.again_at_s:
+            data += self._reset.again(now)
         if data:
             self._ecu.wrote(data, now)
         return packed(data) + once
@@ -253,9 +220,9 @@ class LoisEcuBoard(Board):
     def _heard(self, packets: Packets, now: float) -> None:
         self._ecu.wrote(joined(packets), now)
         if self._ecu.driving:
-            self.reset_given_up()
-        elif self._resets_left == RESETS:
-            self._say_reset_again(now)
+            self._reset.give_up()
+        elif self._reset.left == RESETS:
+            self._reset.plan(now)
 
     def encode(self, order: Order) -> Packets:
         """Return the lines that command ``order``.
@@ -298,29 +265,13 @@ class LoisEcuBoard(Board):
 
         The lines are sent at most ``RESETS`` times, until the reset is proved or given up.
         """
-        if self._reset_proof is not None and not (self._reset_shown or self._leaving):
+        if self._reset.pending and not self._leaving:
             return NO_PACKETS
-        self._reset_proof = None  # a new reset needs a proof of its own
-        self._resets_left, self._reset_shown = RESETS, False
-        return self._reset()
+        return packed(self._reset.begin())
 
     def reset_given_up(self) -> None:
         """Record that the driver has given up the reset, so ``due`` must not repeat it."""
-        self._reset_proof, self._reset_at_s = None, math.inf
-
-    def _reset(self) -> Packets:
-        known = self._ecu.translation.counts
-        steady = known.came_at_s - known.changed_at_s >= STEADY_S
-        if self._reset_proof is None:
-            per_turn = self.settings.ticks_per_revolution
-            self._reset_proof = ResetProof(known.last, per_turn, steady=steady)
-        else:
-            self._reset_proof.again(known.last, steady=steady)
-        return packed(self._ecu.reset())
-
-    def _say_reset_again(self, now: float) -> None:
-        self._resets_left -= 1
-        self._reset_at_s = now + RESET_AGAIN_S if self._resets_left else math.inf
+        self._reset.give_up()
 
     # Functions that only this board has
 
