@@ -109,54 +109,54 @@ class LoisConversation:
         return self._understood(self._decoder.flush(now), now)
 
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
-        restarts = self._translation.counts.restarts
+        translation, upkeep = self._translation, self._upkeep
+        restarts = translation.counts.restarts
         if reports:
             own = not all(isinstance(report, TerminalLine) for report in reports)
-            if own and self.mode is Mode.UNKNOWN and self._upkeep.opened:
-                self._upkeep.writer.begin(now)  # the board may have booted, and lost its settings
+            if own and self.mode is Mode.UNKNOWN and upkeep.opened:
+                upkeep.writer.begin(now)  # the board may have booted, and lost its settings
             self.mode = Mode.NOMINAL
-            self._upkeep.heard_at_s = now
+            upkeep.heard_at_s = now
             self._suspicion.understood()
             self._suspicion.heard(reports, now)
             if own:
-                self._upkeep.change.protocol_heard(now)
-                self._decoder.terminal = self._upkeep.change.terminal
+                upkeep.change.protocol_heard(now)
+                self._decoder.terminal = upkeep.change.terminal
         unit = self._decoder.clock_unit
         times = self._late_reads.times(reports, self._decoder.times, unit)
         for at, report in zip(times, reports, strict=True):
             if isinstance(report, Ticks):
-                self._upkeep.writer.ticks_came(at)
+                upkeep.writer.ticks_came(at)
             elif isinstance(report, GpsDate):
-                self._upkeep.writer.date_came()
+                upkeep.writer.date_came()
             if isinstance(report, Ticks | BoardOdometry):
-                self._stall.heard(report, at, self._translation.odometry.resting)
+                self._stall.heard(report, at, translation.odometry.resting)
         stalled = self._stall.stalled(now)
         if any(stalled):
-            self._upkeep.writer.repeat(now)
-        if self._translation.odometry.appends and any(stalled):
-            rolls_left, rolls_right = self._stall.may_roll
-            self._translation.odometry.stalled(
-                (stalled[0] and not rolls_left, stalled[1] and not rolls_right)
-            )
-            self._points.clear_again()
-        found = self._translation.readings(reports, times, unit, now)
-        if self._translation.needs_date:
-            self._upkeep.writer.ask_date(now)
-        if self._translation.counts.restarts != restarts:
-            self._upkeep.writer.begin(now)
-        if self._upkeep.change.left:
-            self._upkeep.change.left = False
-            self._upkeep.writer.begin(now)
+            upkeep.writer.repeat(now)
+            if translation.odometry.appends:
+                rolls_left, rolls_right = self._stall.may_roll
+                translation.odometry.stalled(
+                    (stalled[0] and not rolls_left, stalled[1] and not rolls_right)
+                )
+                self._points.clear_again()
+        found = translation.readings(reports, times, unit, now)
+        if translation.needs_date:
+            upkeep.writer.ask_date(now)
+        restarted = translation.counts.restarts != restarts
+        if restarted:
+            upkeep.writer.begin(now)
+        if upkeep.change.left:
+            upkeep.change.left = False
+            upkeep.writer.begin(now)
             found.append(TerminalLeft())
         if self._decoder.in_record:  # valid lines, not yet a complete report
-            self._upkeep.heard_at_s = now
+            upkeep.heard_at_s = now
             self._suspicion.understood()
-        return self._upkeep.request.look(
+        return upkeep.request.look(
             found,
             self._decoder,
-            "the board has restarted; call again"
-            if self._translation.counts.restarts != restarts
-            else self._upkeep.change.reason,
+            "the board has restarted; call again" if restarted else upkeep.change.reason,
             self._settings.ticks_per_revolution,
         )
 
