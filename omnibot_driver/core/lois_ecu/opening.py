@@ -16,21 +16,25 @@ from typing import Final
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.codec import encode_command
 from omnibot_driver.core.lois_ecu.messages import (
-    PERIOD_OFF,
     PERIOD_ONCE,
     Command,
     SetPeriod,
     SetTerminalMode,
-    Setting,
     Stream,
     TerminalMode,
-    WriteSetting,
 )
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.settings_round import (
+    ROUNDS,
+    dates_come_periodically,
+    left_short_correction,
+    round_commands,
+    sets_ticks,
+    slow_ticks,
+)
 
 # The pause between two rounds is longer than the time for which the board cannot receive.
-ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
 # For up to 13 ms, the board may receive nothing. Without a pause, the beginning of a set-point and
@@ -54,16 +58,10 @@ DATE_AGAIN_S: Final = 3.0
 TICKS_DUE_S: Final = 1.5
 """Time in s since the last ticks. Before a round writes the period of the ticks again, it waits for
 ticks. After this time without ticks, it no longer waits."""
-FAST_TICKS_MS: Final = 200
-"""Longest period of the ticks in ms that each of the first ``ROUNDS`` rounds writes. Each write
-begins a period anew, but with so short a period, these rounds keep the ticks away for less than
-1 s."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
 boot, which takes two seconds."""
-BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
-"""Value of the left short correction in the public firmware after a boot."""
 
 
 class SettingsWriter:
@@ -184,7 +182,7 @@ class SettingsWriter:
 
         Do nothing if dates come periodically, or if a date was requested recently.
         """
-        if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
+        if dates_come_periodically(self.settings) or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now
         at_s = now + AWAY_S[self._dates_asked % len(AWAY_S)]
@@ -222,7 +220,7 @@ class SettingsWriter:
             self._answered = True
             # A request for one date ended the periodic sending. The following rounds restore the
             # period.
-            if self._dates_come_periodically:
+            if dates_come_periodically(self.settings):
                 self._rounds_left = max(self._rounds_left, ROUNDS - 1)
 
     def due(self, now: float) -> bytes:
@@ -233,7 +231,7 @@ class SettingsWriter:
         if now >= self._settings_at:
             self._begin_round(now)
             found += _taken(self._queue, now)
-        if any(map(_sets_ticks, found)):
+        if any(map(sets_ticks, found)):
             self._ticks_written_at_s = now
         return b"".join(map(self._encoded, found))
 
@@ -272,50 +270,18 @@ class SettingsWriter:
         if self._rounds <= ROUNDS and not self.confirmed:
             self._queue.append((now, outbound.STOP))
             at_s += LINE_S  # a write of its own: its beginning must not meet the end of a setting
-        for command in self._turned(self._rounds, now):
+        # The board sends no dates after a boot. So each round requests one date.
+        periodic = self._answered and dates_come_periodically(self.settings)
+        for command in round_commands(
+            self.settings,
+            self._rounds,
+            ticks=self._writes_ticks(now),
+            correction=self.overwritten,
+            date=not periodic,
+        ):
             self._queue.append((at_s, command))
             at_s += LINE_S
         self._round_at_s = max(self._round_at_s, at_s)
-
-    def _turned(self, rounds: int, now: float) -> list[Command]:
-        """Return the commands of a round, in an order that changes from round to round.
-
-        With a constant order, a board that sends could miss the same line in each round.
-
-        The request for a date comes last: the board answers at once, and would miss the next line.
-        """
-        rest = list(self.commands(now))
-        place = rounds * len(rest) // ROUNDS % len(rest)
-        after, before = self._repeating(rest[place:]), self._repeating(rest[:place])
-        # The board sends no dates after a boot. So each round requests one date.
-        periodic = self._answered and self._dates_come_periodically
-        asked = [] if periodic else [SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)]
-        if self.settings.with_sum:
-            return [*after, *before, *asked]
-        # The mode overwrites the left short correction, which could be lost with a single line.
-        mode = SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
-        again = self._left_short_correction()
-        return [mode, again, *after, again, *before, again, *asked]
-
-    def commands(self, now: float) -> Iterable[Command]:
-        """Yield the commands that write settings, except the terminal mode.
-
-        ``_turned`` changes their order from round to round.
-        """
-        settings = self.settings
-        if self.overwritten or not settings.with_sum:
-            yield self._left_short_correction()
-        yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
-        for stream, period_ms in settings.periods_ms.items():
-            if stream is not Stream.TICKS or self._writes_ticks(now):
-                yield SetPeriod(stream, period_ms)
-        for setting, number in settings.written.items():
-            yield WriteSetting(setting, number)
-
-    @property
-    def _slow_ticks(self) -> bool:
-        """Whether five rounds could keep the ticks away for 1 s or more."""
-        return self.settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
 
     def _writes_ticks(self, now: float) -> bool:
         """Return whether a round that begins now writes the period of the ticks.
@@ -327,24 +293,9 @@ class SettingsWriter:
         undisturbed intervals can confirm it.
         """
         awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S
-        return not (awaited and self._slow_ticks) and (
+        return not (awaited and slow_ticks(self.settings)) and (
             self._rounds <= ROUNDS or not self._rounds % 3
         )
-
-    @property
-    def _dates_come_periodically(self) -> bool:
-        """Whether the user has set a period of the GPS date.
-
-        In this case, a request for one date is harmful: it ends the periodic sending of dates.
-        """
-        return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
-
-    def _repeating(self, commands: Iterable[Command]) -> Iterable[Command]:
-        """Yield ``commands``; a long period of the ticks twice, because few rounds write it."""
-        for command in commands:
-            yield command
-            if _sets_ticks(command) and self._slow_ticks:
-                yield command
 
     def recovery(self) -> bytes:
         """Return the lines that restore the mode of a board that is silent or does not obey."""
@@ -353,21 +304,14 @@ class SettingsWriter:
         # The mode is sent with and without a checksum, because the board's setting may be
         # unexpected.
         back = SetTerminalMode(mode)
-        correction = encode_command(self._left_short_correction(), with_sum=self.settings.with_sum)
+        correction = encode_command(
+            left_short_correction(self.settings), with_sum=self.settings.with_sum
+        )
         return (
             encode_command(back, with_sum=True) + encode_command(back, with_sum=False) + correction
         )
-
-    def _left_short_correction(self) -> WriteSetting:
-        setting = Setting.LEFT_SHORT_CORRECTION
-        number = self.settings.written.get(setting, BOOT_LEFT_SHORT_CORRECTION)
-        return WriteSetting(setting, number)
 
 
 def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
     while queue and now >= queue[0][0]:
         yield queue.popleft()[1]
-
-
-def _sets_ticks(command: Command) -> bool:
-    return isinstance(command, SetPeriod) and command.stream is Stream.TICKS
