@@ -15,13 +15,13 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.messages import (
     EStopButton,
     RecordKind,
     SetLed,
     TerminalLine,
 )
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.repeated_reset import RESETS, RepeatedReset
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings

@@ -12,6 +12,7 @@ from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.late_reads import LateReads
 from omnibot_driver.core.lois_ecu.messages import (
     PERIOD_ONCE,
@@ -34,7 +35,6 @@ from omnibot_driver.core.lois_ecu.misconfiguration import (
     Suspicion,
     own_gains,
 )
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import (
     LoisReading,
     TerminalLeft,

@@ -13,7 +13,7 @@ from omnibot_driver.core.lois_ecu.board_kind import BoardKind
 from omnibot_driver.core.lois_ecu.board_odometry import OdometryReader
 from omnibot_driver.core.lois_ecu.comparison import Comparison
 from omnibot_driver.core.lois_ecu.estimates import Estimates
-from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry, Source
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Stream, Ticks
 from omnibot_driver.core.lois_ecu.misconfiguration import own_gains
 from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
@@ -21,8 +21,6 @@ from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import BOOT_PERIOD_MS, LoisEcuSettings
 from omnibot_driver.core.lois_ecu.wheel_model import CommandKind
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
-
-__all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3

@@ -8,8 +8,8 @@ The messages EStopButton, Record and TerminalLine serve as readings too.
 
 from dataclasses import dataclass
 
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.messages import EStopButton, Record, TerminalLine
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.readings import DisplacementReading, Unstamped
 
 

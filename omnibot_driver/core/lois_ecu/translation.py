@@ -8,6 +8,7 @@ Its input is decoded reports, not lines of text.
 import math
 from typing import Final
 
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.gps_clock import GpsClock
 from omnibot_driver.core.lois_ecu.heading_filter import HeadingFilter
 from omnibot_driver.core.lois_ecu.messages import (
@@ -23,7 +24,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     TerminalLine,
     Ticks,
 )
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.plausibility import (
     ClockUnit,
 )

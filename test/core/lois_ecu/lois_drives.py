@@ -11,7 +11,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import Setting, Stream
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import LoisReading
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import QUIRKS, Firmware, LoisSettings, SimulatedLois

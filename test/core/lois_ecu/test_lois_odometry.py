@@ -20,7 +20,8 @@ from omnibot_driver.core.lois_ecu import (
     encode_report,
 )
 from omnibot_driver.core.lois_ecu.conversation import LoisConversation
-from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
+from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import Firmware, LoisSettings
 
