@@ -26,7 +26,7 @@ from omnibot_driver.simulator.lois_ecu.terminal import COMPASS, GPS, Terminal
 from omnibot_driver.simulator.lois_ecu.timers import Timers
 from omnibot_driver.simulator.lois_ecu.tuning import CORRECTIONS, wheels_of
 from omnibot_driver.simulator.lois_ecu.uart import Uart
-from omnibot_driver.simulator.lois_ecu.vehicle import TrueState, Vehicle
+from omnibot_driver.simulator.lois_ecu.vehicle import Edge, TrueState, Vehicle
 
 CHANNELS = (Channel(),)
 STEP_S = 0.001
@@ -84,7 +84,7 @@ class SimulatedLois:
         self._reader = wire.LineReader(lenient=quirks.lenient_hex)
         self._uart.boot()
         self._obedience.boot()
-        self._pending: dict[int, tuple[bool, int]] = {}
+        self._pending: dict[int, Edge] = {}
         self._clock_ms = 0
         self._timers = Timers()
         self._scan: list[int] = []
@@ -203,7 +203,7 @@ class SimulatedLois:
             self._steps += 1
             now_s = self.now_s
             for edge in vehicle.advance(self._applied_duty, now_s, STEP_S):
-                self._edge(edge.index, edge.at_s, edge.is_long, edge.direction)
+                self._edge(edge, edge.at_s)
             if heard := uart.listen():
                 terminal.heard(heard)
             if now_s < self._boots_until_s:
@@ -218,15 +218,15 @@ class SimulatedLois:
 
     # Interrupts
 
-    def _edge(self, index: int, at_s: float, is_long: bool, direction: int) -> None:
+    def _edge(self, edge: Edge, at_s: float) -> None:
         if self.now_s < self._boots_until_s:
             return
         if self._uart.deaf:
-            self._pending[index] = (is_long, direction)
+            self._pending[edge.index] = edge
             return
         if self.settings.quirks.deaf_while_counting:
             self._uart.miss()
-        self.wheels[index].edge(at_s, is_long, direction)
+        self.wheels[edge.index].edge(at_s, edge.is_long, edge.direction)
         if isinstance(self.odometry, FirmwareOdometry):
             self.odometry.tick(at_s, self.wheels[0].rpm, self.wheels[1].rpm)
 
@@ -272,8 +272,8 @@ class SimulatedLois:
     def _catch_up(self) -> None:
         """Run the interrupt routines that had to wait while interrupts were off."""
         pending, self._pending = self._pending, {}
-        for index, (is_long, direction) in pending.items():
-            self._edge(index, self.now_s, is_long, direction)
+        for edge in pending.values():
+            self._edge(edge, self.now_s)
         self._terminal.heard(self._uart.hear_kept())
         if self.settings.quirks.clock_stops_while_sending:
             self._clock_ms += 1
