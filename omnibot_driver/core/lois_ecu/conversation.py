@@ -235,11 +235,6 @@ class LoisConversation:
                 return OWN_GAINS.format(gains)
         return self._suspicion.advice
 
-    @property
-    def confirmed(self) -> bool:
-        """Whether the board has answered, and sends its ticks with the requested period."""
-        return self._upkeep.writer.confirmed
-
     # Outbound
 
     def due(self, now: float, *, proved: bool = True) -> bytes:

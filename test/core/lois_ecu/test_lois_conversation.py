@@ -42,7 +42,7 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     assert rig.driver.mode is Mode.UNKNOWN
     rig.run(5.0)
     assert rig.driver.mode is Mode.NOMINAL
-    assert rig.driver.confirmed
+    assert rig.driver._upkeep.writer.confirmed
     assert rig.board.wheels[0].controller.gains.kp == pytest.approx(0.5)
     rig.order(20, 20, 4.0)
     assert rig.board.truth.speed_mps > 0.2
@@ -64,7 +64,7 @@ def test_a_restarted_board_is_configured_again() -> None:
         rig.run(0.1)
     rig.driver.silence()
     rig.run(4.0)
-    assert rig.driver.confirmed
+    assert rig.driver._upkeep.writer.confirmed
     rig.order(20, 20, 4.0)
     assert rig.board.truth.speed_mps > 0.2
     place, true = rig.estimates[-1][0].pose, rig.estimates[-1][1]
@@ -105,7 +105,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
         rig.board.receive(encode_command(SetTerminalMode(before)))
         rig.board.step()
     rig.driver = LoisConversation(LoisEcuSettings())
-    while not rig.driver.confirmed:
+    while not rig.driver._upkeep.writer.confirmed:
         rig.run(0.1)
         assert rig.now < 14.5
     rig.run(0.5)
@@ -121,7 +121,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
     "short correction" of the left wheel, so the driver writes it again.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
-    while not rig.driver.confirmed:
+    while not rig.driver._upkeep.writer.confirmed:
         rig.run(0.1)
         assert rig.now < 14.5
     rig.run(0.5)

@@ -58,5 +58,5 @@ def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, perio
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)
-    assert bench.session.board._ecu.confirmed
+    assert bench.session.board._ecu._upkeep.writer.confirmed
     assert bench.board._timers[Stream.GPS_DATE].period_ms == period_ms

@@ -47,7 +47,7 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
-    while not rig.driver.confirmed:
+    while not rig.driver._upkeep.writer.confirmed:
         rig.run(0.1)
         assert rig.now < 14.5
     rig.order(20, 20, 2.0)
@@ -70,7 +70,7 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
     for _ in range(5):
         rig.driver.write_settings(rig.now)
         rig.run(4.0)
-        while not (rig.driver._upkeep.writer.done and rig.driver.confirmed):
+        while not (rig.driver._upkeep.writer.done and rig.driver._upkeep.writer.confirmed):
             rig.run(0.1)
         corrections.append(rig.board.wheels[0].short_correction)
     assert corrections == pytest.approx([BOOT_SHORT_CORRECTION] * 5)
