@@ -50,7 +50,7 @@ def session_of(board: LineBoard) -> Session:
 def link_of(session: Session, openers: list[partial[SerialPort]], listener: Listener) -> Link:
     return Link(
         session,
-        partial(Several, openers, retry_s=0.01),
+        lambda: Several([(each.args[0], each) for each in openers], retry_s=0.01),
         "two lines",
         guard=True,
         reconnect_interval_s=0.02,

@@ -92,7 +92,8 @@ def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
     names = ("port", "front_port")
     for name in names:
         check_address(values[name], name, pollable=True)
-    return partial(Several, [partial(SerialPort, values[n], USB_BAUDRATE, n) for n in names])
+    ports = [(values[n], partial(SerialPort, values[n], USB_BAUDRATE, n)) for n in names]
+    return partial(Several, ports)
 
 
 def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:

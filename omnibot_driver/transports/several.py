@@ -4,11 +4,13 @@
 
 If a line is missing or blocked, the others still work. Missing lines are opened again.
 
-There is one exception: if another program uses the first line, and this transport has not opened
-the first line before, the transport gives up the other lines too. So if two drivers wait for the
-same lines in the same order, one of them gets all lines.
+There is one exception. The *leading* line is the one whose device has the first path in
+alphabetical order. If another program uses it, and this transport has not opened it before, the
+transport gives up the other lines too. So if two drivers wait for the same lines, in any order, one
+of them gets all lines.
 """
 
+import os
 import select
 import threading
 import time
@@ -45,20 +47,21 @@ Opener = Callable[[], ByteLine]
 class Several:
     """A ``Transport`` of several lines. Each line is one channel. All lines are polled together."""
 
-    def __init__(self, openers: Sequence[Opener], retry_s: float = RETRY_S) -> None:
-        """Open the lines.
+    def __init__(self, lines: Sequence[tuple[str, Opener]], retry_s: float = RETRY_S) -> None:
+        """Open the lines, each given as the name of its device and its opener.
 
-        Raises LinkError if no line can be opened, if another program uses the first line, or if a
+        Raises LinkError if no line can be opened, if another program uses the leading line, or if a
         line does not support ``poll``.
         """
         self._retry_s = retry_s
-        self._lines = [Line(opener) for opener in openers]
+        self._names = [name for name, _ in lines]
+        self._lines = [Line(opener) for _, opener in lines]
         self._writing = threading.Lock()
         """Lock that protects the bytes not yet written, and the set of open lines."""
         self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
         self._channels: dict[int, int] = {}
-        self._changed = self._had_first = False
+        self._changed = False
         try:
             self._wake_up = WakeUp()
         except OSError as error:
@@ -105,7 +108,7 @@ class Several:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
         Raises LinesChanged if a line was lost or reopened. Raises LinkError if all lines are
-        missing. Also raises LinkError if another program uses the first line, and this object has
+        missing. Also raises LinkError if another program uses the leading line, and this object has
         never opened the line.
         """
         if not self._ready:
@@ -199,7 +202,7 @@ class Several:
                 port = line.opener()
             except LinkError as error:
                 line.trouble = str(error)
-                if channel == 0 and isinstance(error, PortInUse) and not self._had_first:
+                if isinstance(error, PortInUse) and not line.was_open and self._leads(channel):
                     raise
                 continue
             if port.descriptors is None or len(port.descriptors) != 1:
@@ -209,9 +212,13 @@ class Several:
                 line.begin(port)
                 assert line.descriptor is not None
                 self._channels[line.descriptor] = channel
-                self._had_first |= channel == 0
                 self._arrivals.register(line.descriptor, select.POLLIN)
             self._changed = True
+
+    def _leads(self, channel: int) -> bool:
+        paths = [os.path.realpath(name) for name in self._names]  # a link may change at any time
+        own = paths.pop(channel)
+        return all(own < other for other in paths)
 
     def _write_what_waits(self, now: float) -> None:
         """Write the waiting bytes, and let ``poll`` report when a full line accepts more.
@@ -261,6 +268,8 @@ class Line:
 
     ``trouble``: the reason why the line is missing; empty if it is present.
 
+    ``was_open``: whether the line is open, or has been open before.
+
     ``waits``: the bytes that the line has not accepted yet.
     """
 
@@ -270,6 +279,7 @@ class Line:
         self.descriptor: int | None = None
         self.trouble = "it is not open yet"
         self.retry_at = 0.0
+        self.was_open = False
         self.waits = b""
         self.watched = False
         """Whether ``poll`` is set to report when the line accepts bytes again."""
@@ -292,7 +302,7 @@ class Line:
         """Use ``port``, which has just been opened, for this line."""
         assert port.descriptors is not None
         self.port, (self.descriptor,) = port, port.descriptors
-        self.trouble, self.waits, self.watched = "", b"", False
+        self.trouble, self.waits, self.watched, self.was_open = "", b"", False, True
         self._earlier_overruns += self._overruns
         self._overruns = 0
 

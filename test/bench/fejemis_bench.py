@@ -88,7 +88,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
     )
     session = Session(FejemisBoard(FejemisSettings()), settings, run=True)
     opener: Callable[[], Several] = partial(
-        Several, [partial(SerialPort, port, 115200, "port") for port in ports]
+        Several, [(port, partial(SerialPort, port, 115200, "port")) for port in ports]
     )
     link = Link(
         session,

@@ -108,7 +108,10 @@ def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
     names = "port", "sense_port"
     for name in names:
         check_address(values[name], name, pollable=True)
-    return partial(Several, [partial(SerialPort, values[name], 115200, name) for name in names])
+    urls = {name: values[name] for name in names}
+    return partial(
+        Several, [(url, partial(SerialPort, url, 115200, name)) for name, url in urls.items()]
+    )
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:

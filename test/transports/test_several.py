@@ -19,7 +19,7 @@ from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.transports import LinesChanged
 from omnibot_driver.transports.serial_port import SerialPort
-from omnibot_driver.transports.several import Several
+from omnibot_driver.transports.several import Opener, Several
 
 
 class Ends:
@@ -52,6 +52,10 @@ class Ends:
         self.hang_up(1)
 
 
+def port(path: str) -> tuple[str, Opener]:
+    return path, partial(SerialPort, path, 115200)
+
+
 @pytest.fixture
 def ends(tmp_path: Path) -> Iterator[Ends]:
     ends = Ends(tmp_path)
@@ -61,7 +65,7 @@ def ends(tmp_path: Path) -> Iterator[Ends]:
 
 @pytest.fixture
 def lines(ends: Ends) -> Iterator[Several]:
-    lines = Several([partial(SerialPort, path, 115200) for path in ends.paths])
+    lines = Several([port(path) for path in ends.paths])
     yield lines
     lines.close()
 
@@ -205,7 +209,7 @@ def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
     """A missing line appears. It is opened, and the other line stays open."""
     late = tmp_path / "late"
     paths = str(late), ends.paths[1]
-    lines = Several([partial(SerialPort, path, 115200) for path in paths], retry_s=0.01)
+    lines = Several([port(path) for path in paths], retry_s=0.01)
     with contextlib.closing(lines):
         assert lines.descriptors is not None
         there = lines.descriptors[1]
@@ -233,7 +237,7 @@ def test_where_none_can_be_opened_none_is_kept() -> None:
     before = len(os.listdir("/proc/self/fd"))
     paths = "/dev/no-such", "/dev/no-such-either"
     with pytest.raises(LinkError, match="/dev/no-such does not exist"):
-        Several([partial(SerialPort, path, 115200) for path in paths])
+        Several([port(path) for path in paths])
     assert len(os.listdir("/proc/self/fd")) == before
 
 
@@ -242,30 +246,33 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 
     The reason: a port is exclusive, so it cannot be opened twice.
     """
-    with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
+    with contextlib.closing(Several([port(ends.paths[0])] * 2)) as lines:
         assert "in use" in lines.missing[1]
 
 
+@pytest.mark.parametrize("ours", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("theirs", [(0, 1), (1, 0)])
 def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
-    ends: Ends, tmp_path: Path
+    ours: tuple[int, int], theirs: tuple[int, int], ends: Ends, tmp_path: Path
 ) -> None:
-    """Two drivers wait for the same two lines, and each driver has one of the lines.
+    """Two drivers wait for the same two lines, in any order, and each driver has one of the lines.
 
-    The driver without the first line gives up, so the other driver gets both lines.
+    The driver without the leading line gives up, so the other driver gets both lines.
     """
+    leading, other = sorted(ends.paths, key=os.path.realpath)
     late = tmp_path / "late"
-    openers = [partial(SerialPort, path, 115200) for path in (str(late), ends.paths[1])]
-    with contextlib.closing(Several(openers, retry_s=0.01)) as second:
-        assert list(second.missing) == [0]
-        late.symlink_to(ends.paths[0])
-        with contextlib.closing(Several(openers, retry_s=0.01)) as first:
-            assert "in use" in first.missing[1]
+    paths = str(late), other
+    with contextlib.closing(Several([port(paths[i]) for i in ours], retry_s=0.01)) as second:
+        assert list(second.missing) == [ours.index(0)]
+        late.symlink_to(os.path.realpath(leading))
+        with contextlib.closing(Several([port(paths[i]) for i in theirs], retry_s=0.01)) as first:
+            assert "in use" in first.missing[theirs.index(1)]
             with pytest.raises(LinkError, match="late is in use"):
                 read_on(second)
             second.close()
             assert changed(first) == {}
             with pytest.raises(LinkError, match="late is in use"):
-                Several(openers)
+                Several([port(paths[i]) for i in ours])
 
 
 def test_a_program_that_takes_the_lost_first_line_does_not_cost_the_second(
@@ -289,4 +296,4 @@ def test_a_program_that_takes_the_lost_first_line_does_not_cost_the_second(
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
     """A port without a file descriptor cannot be one of several lines: LinkError is raised."""
     with pytest.raises(LinkError, match="does not work for a board with several ports"):
-        Several([partial(SerialPort, "loop://", 115200)])
+        Several([port("loop://")])
