@@ -2,6 +2,7 @@
 
 """Readings: measurements and states that boards report, in SI units."""
 
+import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -63,6 +64,7 @@ class DisplacementReading:
       the commanded values.
     * ``possible``: False if the robot cannot move so fast. The cause may be a correction of the
       board's own odometry.
+    * ``up_s``: time in s from the restart of the board to this displacement; infinity if unknown.
     """
 
     dx_m: float
@@ -75,6 +77,7 @@ class DisplacementReading:
     measured: bool = True
     possible: bool = True
     doubtful: bool = False
+    up_s: float = math.inf
 
 
 NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, measured=False)

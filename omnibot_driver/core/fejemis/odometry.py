@@ -153,7 +153,9 @@ class PoseOdometry:
         if before is None:
             self._begin_at(pose)
             restarted, self._restarted = self._restarted, False
-            nothing = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)
+            nothing = DisplacementReading(
+                0.0, 0.0, 0.0, "body", None, 0, restarted=True, up_s=pose.time_s
+            )
             return nothing if restarted else None
         seconds = pose.time_s - before.time_s
         way = log_of(self._told.way_to(_place(pose)))

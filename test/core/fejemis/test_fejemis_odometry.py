@@ -14,6 +14,7 @@ from fejemis_drive import PERIOD_S, TRACK_M, Drive, told
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.messages import BoardPose, WheelSpeeds
+from omnibot_driver.core.fejemis.odometry import PoseOdometry
 from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
 from omnibot_driver.core.odometry.estimate import OdometrySettings
@@ -48,6 +49,20 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
         spread[with_speeds] = statistics.pstdev(speeds)
     assert spread[False] > 0.015
     assert spread[True] < 0.004
+
+
+def test_the_first_pose_after_a_restart_says_how_long_ago_the_board_restarted() -> None:
+    """The board restarts, and its first pose comes 0.3 s later.
+
+    The displacement contains these 0.3 s, because the robot may have driven until the restart.
+    """
+    odometry = PoseOdometry(TRACK_M)
+    odometry.pose(BoardPose(50.0, 1.0, 0.0, 0.0, 3))
+    odometry.forget()
+    displacement = odometry.pose(BoardPose(0.3, 0.0, 0.0, 0.0, 3))
+    assert displacement is not None
+    assert displacement.restarted
+    assert displacement.up_s == 0.3
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:

@@ -167,6 +167,22 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
     assert math.sqrt(covariance.yaw_yaw) > abs(turn) / PERIOD_S * 0.5 / 2
 
 
+def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_before_it() -> None:
+    """A board was unheard for 3 s, and reports that it restarted 0.2 s ago.
+
+    Until then, the robot may have driven on at 0.5 m/s: the covariance includes half of this way.
+    """
+    odometry, trip = Odometry(SETTINGS), Trip()
+    attach(odometry, trip.pose)
+    for _ in range(10):
+        odometry.displace(trip.move(0.02, 0.0, -0.04), 1.0)
+    nothing = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True, up_s=0.2)
+    estimates = odometry.displace(nothing, 4.0) + odometry.settle(PoseReading(0.0, 0.0, 0.0))
+    covariance = estimates[-1].covariance
+    assert math.sqrt(covariance.xx) > 0.5 * 2.8 / 2
+    assert math.sqrt(covariance.yaw_yaw) > 0.04 / PERIOD_S * 2.8 / 2
+
+
 def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> None:
     """After a reset of the odometry, a loss that an earlier pose showed adds no motion."""
     odometry, trip = Odometry(SETTINGS), Trip()
