@@ -9,12 +9,11 @@ docs/internals/architecture.md gives the rules.
 This module knows readings and the robot's limits; it does not know bytes or a clock.
 """
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, inf, isfinite
-from operator import sub
+from math import hypot, isfinite
 from typing import Final
 
+from omnibot_driver.core.measurement.spikes import Spikes
 from omnibot_driver.core.readings import (
     DisplacementReading,
     ImuReading,
@@ -28,12 +27,6 @@ from omnibot_driver.core.values import value
 Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
-OUT_OF_PROPORTION: Final = 3.0
-"""Limit for a change between two readings, as a multiple of the largest recent change
-(``_restless``). Only a larger change can be a spike."""
-CALMING: Final = 0.95
-"""Factor by which ``_restless``, the largest recent change, is reduced with each reading. After
-20 readings, a third of it is left."""
 STILL: Final = 0.08
 """Limit for spikes of the IMU, as a fraction of the spike's size.
 
@@ -42,9 +35,6 @@ STILL: Final = 0.08
 * If a flipped bit has changed a value, all other values of the reading have changed by at most this
   fraction of the flipped value's change.
 """
-END_OF_SCALE: Final = 0.99996
-"""Fraction of the accelerometer's full scale. A reading of at least this fraction is regarded as
-at the end of the scale. The largest positive reading of 16 bits is just above the fraction."""
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
 changed implausibly much. The others are the poses after it."""
@@ -103,8 +93,8 @@ class OutlierFilter:
         self.limits = limits
         self.refused_imu = self.refused_displacements = 0
         self._tick_s, self._corrected = tick_s, corrected
-        self._imu_leaps = _Spikes(STILL, knocked=3)
-        self._motion_leaps = _Spikes(BACK, knocked=0)
+        self._imu_leaps = Spikes(STILL, knocked=3)
+        self._motion_leaps = Spikes(BACK, knocked=0)
         self._lasted_s = 0.0
         """Duration in s of the last plausible displacement; 0 if there was none."""
         self._held_imu: list[tuple[ImuReading, float]] = []
@@ -246,90 +236,8 @@ class OutlierFilter:
         return made_good
 
 
-class _Spikes:
-    """Finds spikes in a series of readings. Each reading is a list of values.
-
-    The values are scaled so that a change of 1 between two readings is always plausible.
-
-    * ``left``: largest remaining change after a spike, as a fraction of the spike.
-    * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
-      can change implausibly much. Such a change may be a spike only if one flipped bit explains it.
-    """
-
-    def __init__(self, left: float, *, knocked: int) -> None:
-        self._left = left
-        self._knocked = knocked
-        self.forget()
-
-    def forget(self) -> None:
-        """Forget all readings until now, because the next ones are unrelated to them."""
-        self._sure: Sequence[float] | None = None
-        self._leaping: Sequence[float] | None = None
-        self._restless = 0.0
-
-    def judge(
-        self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
-    ) -> tuple[bool, bool]:
-        """Return whether the values of the last call were a spike, and whether the new values leap.
-
-        Values leap if they change implausibly much; the next call shows whether they were a spike.
-
-        ``periods``: number of sampling periods between the previous and the new values.
-
-        ``topmost_bit``: value of the highest bit of the accelerations, in the same units as
-        ``values``.
-        """
-        leaping, self._leaping = self._leaping, None
-        was_single = False
-        if leaping is not None and self._sure is not None:
-            leapt = max(_steps(self._sure, leaping))
-            was_single = max(_steps(self._sure, values)) <= self._left * leapt
-            if was_single:  # from now on, only a larger leap may be a spike
-                self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
-            else:
-                self._restless = max(self._restless, leapt)
-                self._sure = leaping
-        if self._sure is None:
-            self._sure = values
-            return False, False
-        largest = max(_steps(self._sure, values))
-        least = max(periods, OUT_OF_PROPORTION * self._restless)
-        if largest > least:
-            steps = list(_steps(self._sure, values))
-            alone = sorted(steps)[-2] <= self._left * largest
-            value = abs(values[steps.index(largest)])
-            flipped = alone and self._is_a_bit(largest, value, topmost_bit)
-            if flipped or max(steps[self._knocked :]) > least:
-                self._leaping = values
-                return was_single, True
-        self._restless = max(CALMING * self._restless, largest)
-        self._sure = values
-        return was_single, False
-
-    def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether one flipped bit can explain a change.
-
-        ``step``: size of the change. The readings vary, so the size may differ from the value of a
-        bit by up to ``OUT_OF_PROPORTION`` times the largest recent change.
-
-        ``value``: magnitude after the change. At the end of the scale, the result is False, because
-        a knock against the robot can also cause such a value.
-        """
-        if topmost == inf:  # the readings are not integers
-            return False
-        slack = OUT_OF_PROPORTION * self._restless
-        bit = topmost if value < END_OF_SCALE * topmost else 0.0
-        while bit > step + slack:
-            bit /= 2
-        return abs(step - bit) <= slack
-
-
 def _is_finite(reading: OdometryReading) -> bool:
     twist, errors = reading.twist, reading.covariance
     spread = errors.xx + errors.yy + errors.yaw_yaw + sum(reading.twist_variances)
     speed = twist.vx_mps + twist.vy_mps + twist.yaw_rate_radps
     return reading.pose.finite and isfinite(spread) and isfinite(speed)
-
-
-def _steps(before: Sequence[float], after: Sequence[float]) -> Iterator[float]:
-    return map(abs, map(sub, after, before))
