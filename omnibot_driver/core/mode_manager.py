@@ -16,7 +16,7 @@ from typing import Final
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.packets import NO_PACKETS, Packets
-from omnibot_driver.core.requests import OnExit, Request, RequestDone
+from omnibot_driver.core.requests import Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
@@ -41,8 +41,6 @@ A paused board sends a «Paused» text every second. In two cases, the text prov
 - Data arrive within this time after the text. The board may have begun to run after it sent the
   text.
 """
-LAST_STOPS: Final = 3
-"""Number of copies of Stop sent at once before the port is closed, because one can be lost."""
 HELD: Final = (
     ", but the e-stop is latched: the robot does not move until you release it with ~/estop"
 )
@@ -277,24 +275,6 @@ class ModeManager:
             self._give_up(now)
         elif self.phase is Phase.STARTING and now - self._said_at >= START_RETRY_S:
             self._say(self._board.start(), now)
-
-    def shutdown_sequence(self, on_exit: OnExit, *, proved: bool) -> Packets:
-        """Return the last packets to the board.
-
-        ``proved``: whether a standstill is proved. If it is, the packets contain no Stop.
-        """
-        stops = 0 if proved else LAST_STOPS
-        return stops * self._board.stop() + self._last_request(on_exit) + self._board.switch_off()
-
-    def _last_request(self, on_exit: OnExit) -> Packets:
-        settled = self.phase is Phase.SETTLED
-        if on_exit == "reset":
-            return self._board.reset()
-        if on_exit == "pause" and settled and self._board.mode.running:
-            return self._board.pause()
-        if on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
-            return self._board.force_pause()
-        return NO_PACKETS
 
     def _begin(self, now: float) -> None:
         """Wake the board. Also start it if it should run and if it can be started."""

@@ -5,12 +5,17 @@
 This module must not know bytes, nor how long the caller waits.
 """
 
+from typing import Final
+
 from omnibot_driver.core.board import Board, Mode
 from omnibot_driver.core.commands.interlocks import Interlocks
 from omnibot_driver.core.commands.policy import CommandPolicy
-from omnibot_driver.core.mode_manager import ModeManager
+from omnibot_driver.core.mode_manager import ModeManager, Phase
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.requests import OnExit
+
+LAST_STOPS: Final = 3
+"""Number of copies of Stop sent at once before the port is closed, because one can be lost."""
 
 
 class Shutdown:
@@ -63,8 +68,10 @@ class Shutdown:
 
     def sequence(self, on_exit: OnExit, now: float) -> Packets:
         """Return the last packets to write before the port is closed."""
-        proved = self._policy.quiet and self.stands
-        packets = self._mode_manager.shutdown_sequence(on_exit, proved=proved)
+        stops = 0 if self._policy.quiet and self.stands else LAST_STOPS
+        packets = (
+            stops * self._board.stop() + self._last_request(on_exit) + self._board.switch_off()
+        )
         self._policy.discard(now)
         return packets + self._estop_again()
 
@@ -74,6 +81,16 @@ class Shutdown:
         These packets wake the board. If the e-stop is latched, they also repeat the emergency stop.
         """
         return self._board.wake() + self._estop_again()
+
+    def _last_request(self, on_exit: OnExit) -> Packets:
+        settled = self._mode_manager.phase is Phase.SETTLED
+        if on_exit == "reset":
+            return self._board.reset()
+        if on_exit == "pause" and settled and self._board.mode.running:
+            return self._board.pause()
+        if on_exit == "pause" and not (settled and self._board.mode is Mode.PAUSED):
+            return self._board.force_pause()
+        return NO_PACKETS
 
     def _estop_again(self) -> Packets:
         return self._board.emergency_stop() if self._policy.latched else NO_PACKETS
