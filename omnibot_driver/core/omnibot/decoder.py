@@ -128,7 +128,10 @@ class FrameDecoder:
         self.skipped = []
         self.at_rest = False
         self.pauses.clear()
-        self._close(found)
+        if self._held:
+            self._settle(found, closed=True)
+            self._drop(len(self._held))
+        self.context = NOTHING_KNOWN
         return found
 
     @property
@@ -145,17 +148,6 @@ class FrameDecoder:
     def fresh(self) -> bool:
         """Whether some bytes of the last accepted frame arrived with the last call of ``feed``."""
         return len(self._held) < self._arrived
-
-    @property
-    def _unused(self) -> bool:
-        """Whether the decoder has neither accepted nor discarded anything so far."""
-        return not self._in_step and self._damaged_at_s == -math.inf
-
-    def _close(self, found: list[Frame]) -> None:
-        if self._held:
-            self._settle(found, closed=True)
-            self._drop(len(self._held))
-        self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
         """Accept ``data`` if it consists only of expected frames with usual content.
@@ -315,7 +307,8 @@ class FrameDecoder:
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
         in_step, end = self._in_step, -1
-        alone = closed and len(pieces) == 1 and pieces[0].start == 0 and self._unused
+        is_unused = not in_step and self._damaged_at_s == -math.inf  # nothing accepted or discarded
+        alone = closed and len(pieces) == 1 and pieces[0].start == 0 and is_unused
         if alone:
             cost, _ = self.expectation.weigh(pieces[0].frame, pieces[0].before)
             alone = cost < SPOKEN_AGAINST
