@@ -9,7 +9,6 @@ requests.
 import math
 from collections.abc import Sequence
 from enum import Enum
-from typing import Final
 
 from omnibot_driver.core.board import Board
 from omnibot_driver.core.commands.limits import require_timely
@@ -35,7 +34,6 @@ from omnibot_driver.core.settings import SessionSettings
 
 Command = tuple[Setpoint, float]
 """A motion that has passed the checks, and the time in s at which this motion expires."""
-NEVER: Final = math.inf
 
 
 class CommandPipeline:
@@ -165,7 +163,7 @@ class CommandPipeline:
 
     def pose(self, goal: Pose) -> Command:
         """Return the command to drive to a pose in the odometry frame, which never expires."""
-        return self.shaper.pose(goal, before=self.policy.current), NEVER
+        return self.shaper.pose(goal, before=self.policy.current), math.inf
 
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that packets of a request, such as a start, were sent. These command no motion."""
