@@ -16,7 +16,7 @@ from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.parameters import Parameter
 from omnibot_driver.tools.calibrate import client, listener
 from omnibot_driver.tools.calibrate.__main__ import main
-from omnibot_driver.tools.calibrate.motion import Bounds, steady
+from omnibot_driver.tools.calibrate.motion import Bounds, stairs
 from omnibot_driver.tools.calibrate.robot import Robot
 from omnibot_driver.tools.needs import ToolError
 
@@ -45,7 +45,7 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
     assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
     name = re.escape(robot.driver)
     with pytest.raises(ToolError, match=f"several drivers in this namespace: {name}, {name}; end"):
-        robot.drive(steady((0.1, 0.0, 0.0), 1.0), Bounds(speed=0.1, way=0.5, seconds=5.0))
+        robot.drive(stairs([(1.0, (0.1, 0.0, 0.0))]), Bounds(speed=0.1, way=0.5, seconds=5.0))
     assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[before:])
 
 

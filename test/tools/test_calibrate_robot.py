@@ -22,7 +22,7 @@ from omnibot_driver.simulator.omnibot import SimulatedBoard
 from omnibot_driver.tools.calibrate import listener
 from omnibot_driver.tools.calibrate import robot as robot_module
 from omnibot_driver.tools.calibrate.interruption import Interrupted
-from omnibot_driver.tools.calibrate.motion import Bounds, steady
+from omnibot_driver.tools.calibrate.motion import Bounds, stairs
 from omnibot_driver.tools.calibrate.robot import Robot
 from omnibot_driver.tools.needs import ToolError
 
@@ -59,7 +59,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
     """
     for _ in range(ATTEMPTS):
         before = rigged.port.board.truth
-        log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
+        log = robot.drive(stairs([(1.0, (0.0, 0.15, 0.3))]), BOUNDS)
         assert rigged.port.wait_for(stands, PATIENCE_S)
         after = rigged.port.board.truth
         # Each command is in effect until the next one.
@@ -114,7 +114,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
         PATIENCE_S,
     )
     with pytest.raises(ToolError, match=sentence) as caught:
-        robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=shown[what])
+        robot.drive(stairs([(10.0, SLOWLY)]), BOUNDS, show=shown[what])
     assert rigged.port.wait_for(stands, PATIENCE_S)
     assert not robot.log.commands.values[-1].any()
     assert isinstance(caught.value, Interrupted) is (what == "signal")
@@ -158,10 +158,10 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
     with pytest.raises(
         ToolError, match=r"limit of this drive \(it was 0\.\d\d m from its start, 0\.05"
     ):
-        robot.drive(steady(SLOWLY, 10.0), near)
+        robot.drive(stairs([(10.0, SLOWLY)]), near)
     assert rigged.port.wait_for(stands, PATIENCE_S)
     with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
-        robot.drive(steady((0.3, 0.0, 0.0), 1.0), near)
+        robot.drive(stairs([(1.0, (0.3, 0.0, 0.0))]), near)
     assert not robot.log.commands.values.any()
 
 
@@ -172,7 +172,7 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
     """
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):
-        robot.drive(steady(SLOWLY, 10.0), BOUNDS)
+        robot.drive(stairs([(10.0, SLOWLY)]), BOUNDS)
     robot.set_parameters({"linear_scale": 70.0})
 
 
@@ -188,7 +188,7 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
         os.kill(os.getpid(), signal.SIGINT)
 
     with pytest.raises(Interrupted):
-        robot.drive(steady(SLOWLY, 10.0), BOUNDS, monitored=False, show=once(interrupt))
+        robot.drive(stairs([(10.0, SLOWLY)]), BOUNDS, monitored=False, show=once(interrupt))
     assert seen == [False]
     assert parameters_of(rigged.driver)["motion_monitor"] is True
     assert rigged.port.wait_for(stands, PATIENCE_S)
@@ -214,7 +214,7 @@ def test_an_interruption_before_a_motion_leaves_the_motion_monitor_on(
 
     monkeypatch.setattr(robot, "set_parameters", interrupted)
     with pytest.raises(Interrupted) as ended:
-        robot.drive(steady(SLOWLY, 0.5), BOUNDS, monitored=False)
+        robot.drive(stairs([(0.5, SLOWLY)]), BOUNDS, monitored=False)
     assert "cut its power" not in str(ended.value)
     assert parameters_of(rigged.driver)["motion_monitor"] is True
 
@@ -228,7 +228,7 @@ def test_a_motion_is_not_evaluated_if_the_clocks_differ(
     monkeypatch.setattr(listener, "_seconds", lambda message: seconds(message) - behind_s)
     sign = "-" if behind_s < 0 else ""
     with pytest.raises(ToolError, match=rf"arrives {sign}0\.\d\d s after .*chrony"):
-        robot.drive(steady(SLOWLY, 0.5), BOUNDS)
+        robot.drive(stairs([(0.5, SLOWLY)]), BOUNDS)
     assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
@@ -255,7 +255,7 @@ def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> Non
         raise RuntimeError("a defect")
 
     with pytest.raises(RuntimeError, match="a defect"):
-        robot.drive(steady(SLOWLY, 10.0), BOUNDS, monitored=False, show=once(fail))
+        robot.drive(stairs([(10.0, SLOWLY)]), BOUNDS, monitored=False, show=once(fail))
     assert parameters_of(rigged.driver)["motion_monitor"] is True
     assert rigged.port.wait_for(stands, PATIENCE_S)
 
@@ -276,7 +276,7 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(robot_module, "time", clock)
         with pytest.raises(ToolError, match=r"this program did not run for \d\.\d s"):
-            robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=once(suspend))
+            robot.drive(stairs([(10.0, SLOWLY)]), BOUNDS, show=once(suspend))
     values = robot.log.commands.values
     halted = int(np.flatnonzero(values[:, 0])[-1]) + 1
     assert not values[halted:].any()
@@ -296,10 +296,10 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
         ToolError,
         match=r"^Stop was sent, but the robot still moves, or no odometry arrives",
     ):
-        robot.drive(steady(SLOWLY, 0.5), BOUNDS)
+        robot.drive(stairs([(0.5, SLOWLY)]), BOUNDS)
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(ToolError, match=r"at a limit of this drive .*; and Stop was sent, but"):
-        robot.drive(steady(SLOWLY, 10.0), near)
+        robot.drive(stairs([(10.0, SLOWLY)]), near)
 
 
 def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
@@ -315,7 +315,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
             robot._on_odometry(nonsense, {"received_timestamp": 0})
 
     with pytest.raises(ToolError, match="contains NaN or infinity"):
-        robot.drive(steady(SLOWLY, 10.0), BOUNDS, show=spoil)
+        robot.drive(stairs([(10.0, SLOWLY)]), BOUNDS, show=spoil)
     assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
@@ -385,5 +385,5 @@ def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
         pytest.MonkeyPatch.context() as patch,
         pytest.raises(ToolError, match=r"no messages on .* for 0\.3 s.*cut its power"),
     ):
-        robot.drive(steady(SLOWLY, 30.0), BOUNDS, show=kill_once_it_moves)
+        robot.drive(stairs([(30.0, SLOWLY)]), BOUNDS, show=kill_once_it_moves)
     assert rigged.port.wait_for(stands, PATIENCE_S)

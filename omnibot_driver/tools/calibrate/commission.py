@@ -26,7 +26,7 @@ from omnibot_driver.tools.calibrate.meaning import (
     frame_is_right,
     require_motion,
 )
-from omnibot_driver.tools.calibrate.motion import Bounds, stairs, steady
+from omnibot_driver.tools.calibrate.motion import Bounds, stairs
 from omnibot_driver.tools.calibrate.mounting import (
     Mounting,
     bias,
@@ -302,8 +302,9 @@ class Walk:
             acceleration=math.inf,
             angular_acceleration=math.inf,
         )
-        law = stairs(plan) if len(plan) > 1 else steady(plan[0][1], plan[0][0])
-        log: Log = self._robot.drive(law, bounds, topic=topic, obeys=obeys, monitored=False)
+        log: Log = self._robot.drive(
+            stairs(plan), bounds, topic=topic, obeys=obeys, monitored=False
+        )
         return log
 
 

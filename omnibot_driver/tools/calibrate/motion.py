@@ -154,11 +154,6 @@ class Obedience:
         return math.hypot(values[0], values[1]), abs(values[2])
 
 
-def steady(command: Vector3, seconds: float) -> Law:
-    """Return a control law that gives the same command for ``seconds``, then ends the motion."""
-    return lambda now_s, _pose: command if now_s < seconds else None
-
-
 def stairs(steps: list[tuple[float, Vector3]]) -> Law:
     """Return a control law that gives these commands one after the other, then ends the motion.
 
