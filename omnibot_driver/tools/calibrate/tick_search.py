@@ -169,8 +169,7 @@ class Search:
         return any_missed
 
     def _off_even(self, values: Column) -> list[Column]:
-        off = self._measured / self._told(values, np.zeros(1)) - 1.0
-        return np.split(off, np.cumsum(self._lengths)[:-1])
+        return self._rows(self._measured / self._told(values, np.zeros(1)) - 1.0)
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
         """Fit the plant together with the marks' positions; return only the plant's values.
@@ -181,7 +180,7 @@ class Search:
         self._marks, own = len(marks.steps), len(values)
         self._first_marks = [marks.first(row) for row in self.off(values)]
         values = np.concatenate((values, marks.places))
-        self._sigma = max(SHARPEST, 1.4826 * float(np.median(np.abs(self._relative(values)))))
+        self._sigma = max(SHARPEST, _spread(self._relative(values)))
         values = self._best([values])
         self._marks, self._off = 0, values[own:]
         return np.asarray(values[:own])
@@ -192,13 +191,11 @@ class Search:
         ``values``: the values of the plant. The correlation comes from the load, and from uneven
         marks that are not fitted yet.
         """
-        rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
-        every = np.concatenate(rows)
-        spread = 1.4826 * float(np.median(np.abs(every)))
+        every = self._relative(values)
         lags = 1
         if len(self._off) > 1:
-            lags, self._good = LAGS, np.abs(every) < OUTLIER * spread
-        self._whitener = whitener(correlation(rows, lags), max(self._lengths))
+            lags, self._good = LAGS, np.abs(every) < OUTLIER * _spread(every)
+        self._whitener = whitener(correlation(self._rows(every), lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
         """Return the relative residuals for ``values``, without outliers.
@@ -206,8 +203,7 @@ class Search:
         A correlation that ``correlate`` has measured is removed.
         """
         left = self._residuals(values) * self._sigma
-        spread = 1.4826 * float(np.median(np.abs(left)))
-        return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
+        return np.asarray(left[np.abs(left) < 5 * max(_spread(left), 1e-3)])
 
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
@@ -224,15 +220,8 @@ class Search:
         records = len(self._lengths)
         if records < FEWEST_RECORDS:
             return np.asarray(covariance)
-        ends = np.cumsum(self._lengths)[:-1]
-        pulls = np.array(
-            [
-                rows.T @ np.clip(left, -5 * rms, 5 * rms)
-                for rows, left in zip(
-                    np.split(jacobian, ends), np.split(self._residuals(values), ends), strict=True
-                )
-            ]
-        )
+        rows = zip(self._rows(jacobian), self._rows(self._residuals(values)), strict=True)
+        pulls = np.array([row.T @ np.clip(left, -5 * rms, 5 * rms) for row, left in rows])
         scatter = (inverse @ (pulls.T @ pulls) @ inverse)[:own, :own] * records / (records - 1)
         grown = np.sqrt(np.maximum(np.diag(scatter) / np.diag(covariance), 1.0))
         return np.asarray(covariance * np.outer(grown, grown))
@@ -286,8 +275,12 @@ class Search:
         found = np.where(self._good, self._relative(values) / self._sigma, 0.0)
         if self._whitener is None:
             return found
-        rows = np.split(found, np.cumsum(self._lengths)[:-1])
+        rows = self._rows(found)
         return np.concatenate([self._whitener[: len(row), : len(row)] @ row for row in rows])
+
+    def _rows(self, of_all: Column) -> list[Column]:
+        """Split an array with one row for each time into one array for each record."""
+        return np.split(of_all, np.cumsum(self._lengths)[:-1])
 
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the predicted times between ticks in s, record after record.
@@ -309,6 +302,11 @@ class Search:
             places = rate * turned(np.array([begin_s]), slow_s, fast_s) + count + marks - marks[0]
             told.append(np.diff(np.interp(places, way, grid_s)))
         return np.asarray(np.maximum(np.concatenate(told), 1e-6))
+
+
+def _spread(errors: Column) -> float:
+    """Return the standard deviation of errors, estimated from their median magnitude."""
+    return 1.4826 * float(np.median(np.abs(errors)))
 
 
 def _cost(found: Any) -> float:
