@@ -48,9 +48,6 @@ A new fit can shift the fitted clock to later times. With this limit, the stamps
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times do not allow a larger step."""
 
-WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
-"""The ``SampleBoundary`` of a read that ends with a complete sample."""
-
 
 class DeviceClock:
     """Stamps readings with their sampling times, which it estimates from arrival times.
@@ -109,7 +106,7 @@ class DeviceClock:
         return 0.0 if line is None else 1e6 * (self._period_s / line.slope_s - 1.0)
 
     def stamps(
-        self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None = WHOLE
+        self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
         """Return the sampling time in s of each reading.
 

@@ -24,6 +24,7 @@ SKEWS = [1e-4, -1e-4]
 CRYSTALS = pytest.mark.parametrize(("skew", "imu_only"), [(1e-4, False), (-1e-4, True)])
 JITTER_S = 60e-6
 SETTLED_S = 2.0
+WHOLE = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 COUNTS = 16384 / STANDARD_GRAVITY
 
@@ -233,7 +234,7 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
     """
     clock = DeviceClock(0.01)
     for tick in range(1000):
-        clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
+        clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew), WHOLE)
     assert clock.skew_ppm == pytest.approx(1e6 * skew, abs=1.0)
 
 
@@ -306,7 +307,8 @@ def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
     after = {tick: [true] for tick in range(0, 200, 4)} | {102: [made_up]}
     stamps_s = [
-        clock.stamps([SAMPLE, *after.get(tick, [])], 1000.0 + 0.01 * tick)[0] for tick in range(200)
+        clock.stamps([SAMPLE, *after.get(tick, [])], 1000.0 + 0.01 * tick, WHOLE)[0]
+        for tick in range(200)
     ]
     differences = [after - before for before, after in pairwise(stamps_s)]
     assert differences == pytest.approx([0.01] * 199, abs=1e-6)
@@ -352,7 +354,7 @@ def test_displacements_alone_are_stamped_forwards() -> None:
     """The board sends no samples, only a displacement every 40 ms. The stamps are 40 ms apart."""
     clock = DeviceClock(0.01)
     reading = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
-    stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k)[0] for k in range(500)]
+    stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k, WHOLE)[0] for k in range(500)]
     differences = [after - before for before, after in pairwise(stamps_s)]
     assert differences == pytest.approx([0.04] * 499, abs=1e-6)
 
@@ -363,6 +365,6 @@ def test_stamps_increase_even_where_arrival_times_do_not() -> None:
     The stamps still increase, by a microsecond each.
     """
     clock = DeviceClock(0.01)
-    stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
+    stamps_s = [clock.stamps([SAMPLE], 5.0, WHOLE)[0] for _ in range(100)]
     assert all(before < after for before, after in pairwise(stamps_s))
     assert stamps_s[-1] == pytest.approx(5.0, abs=1e-3)
