@@ -17,7 +17,7 @@ from rclpy._rclpy_pybind11 import RMWError
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
 
-from omnibot_driver import messages
+from omnibot_driver import command_messages, messages
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -116,7 +116,7 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
         if finite and encapsulation == LITTLE_ENDIAN:
             return BodyTwist(x, y, yaw), not (z or roll or pitch)
         message = deserialize_message(data, Twist)
-        return messages.body_twist(message), messages.is_planar(message)
+        return command_messages.body_twist(message), command_messages.is_planar(message)
     except (RMWError, struct.error) as error:
         raise CommandRefused(
             f"cmd_vel rejected: not a valid Twist ({error}); fix the publishing node"
@@ -128,7 +128,7 @@ def is_zero(data: bytes) -> bool:
 
     Raises CommandRefused in the same cases as ``twist``.
     """
-    return twist(data)[0] == messages.AT_REST
+    return twist(data)[0] == command_messages.AT_REST
 
 
 class Messages:

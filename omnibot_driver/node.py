@@ -23,6 +23,14 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float32MultiArray
 
 from omnibot_driver import boards, cdr, declaration, messages, parameters, selfcheck
+from omnibot_driver.command_messages import (
+    age,
+    body_twist,
+    goal_pose,
+    is_planar,
+    is_stamped,
+    is_zero,
+)
 from omnibot_driver.command_topics import Action, obeying
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.reporting.figures import Refusals
@@ -195,8 +203,8 @@ class OmniBotDriver(Node):
                 obey = self._obey(
                     "cmd_vel",
                     self._twist_stamped,
-                    may_be_old=messages.is_stamped,
-                    ends_goal=lambda stamped: messages.is_zero(stamped.twist),
+                    may_be_old=is_stamped,
+                    ends_goal=lambda stamped: is_zero(stamped.twist),
                 )
                 self.create_subscription(TwistStamped, "cmd_vel", obey, 1)
             else:
@@ -222,13 +230,13 @@ class OmniBotDriver(Node):
         return obeying(self._link, topic, action, expires_s, **judges)
 
     def _twist_stamped(self, session: Session, stamped: TwistStamped, now: float) -> None:
-        age_s = messages.age(stamped.header.stamp, self.get_clock().now().nanoseconds)
-        twist, planar = messages.body_twist(stamped.twist), messages.is_planar(stamped.twist)
+        age_s = age(stamped.header.stamp, self.get_clock().now().nanoseconds)
+        twist, planar = body_twist(stamped.twist), is_planar(stamped.twist)
         session.command_twist(twist, now, age_s=age_s, planar=planar)
 
     def _pose(self, session: Session, goal: PoseStamped, now: float) -> None:
         frame = self._publishing.settings.odom_frame
-        session.command_pose(messages.goal_pose(goal, frame), now)
+        session.command_pose(goal_pose(goal, frame), now)
 
     def _look_around(self) -> None:
         """Warn once of each mistake that ROS does not report, e.g. two nodes with the same name."""

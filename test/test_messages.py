@@ -13,7 +13,7 @@ from geometry_msgs.msg import PoseStamped, Twist
 from hypothesis import given
 from hypothesis import strategies as st
 
-from omnibot_driver import boards, messages
+from omnibot_driver import boards, command_messages, messages
 from omnibot_driver.boards import omnibot
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.omni import OmniKinematics
@@ -40,12 +40,12 @@ def test_a_stamp_is_seconds_and_nanoseconds() -> None:
 @pytest.mark.parametrize(("sec", "nanosec", "age_s"), [(98, 0, 2.0), (102, 5 * 10**8, -2.5)])
 def test_a_stamp_has_an_age_by_the_clock_that_gave_it(sec: int, nanosec: int, age_s: float) -> None:
     """The age of a stamp is the time since the stamp. It is negative for a stamp in the future."""
-    assert messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
+    assert command_messages.age(Time(sec=sec, nanosec=nanosec), 100 * 10**9) == pytest.approx(age_s)
 
 
 def test_a_zero_stamp_is_not_a_stamp() -> None:
     """A zero stamp means that a command has no stamp, so its age is 0."""
-    assert messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
+    assert command_messages.age(Time(), 1_700_000_000 * 10**9) == 0.0
 
 
 def goal(
@@ -68,7 +68,7 @@ def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     Some senders do not normalize the quaternion.
     """
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
-    pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
+    pose = command_messages.goal_pose(goal(1.0, -2.0, turn), "odom")
     assert (pose.x_m, pose.y_m) == (1.0, -2.0)
     assert math.remainder(pose.yaw_rad - yaw_rad, math.tau) == pytest.approx(0.0, abs=1e-9)
 
@@ -76,7 +76,7 @@ def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
 @pytest.mark.parametrize("frame", ["", "odom"])
 def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
     """A goal with an empty frame is accepted. It counts as a goal in the odometry frame."""
-    assert messages.goal_pose(goal(1.0, frame=frame), "odom") == Pose(1.0, 0.0, 0.0)
+    assert command_messages.goal_pose(goal(1.0, frame=frame), "odom") == Pose(1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 ) -> None:
     """A goal is refused for a wrong frame, a number that is not finite, or an invalid rotation."""
     with pytest.raises(CommandRefused, match=f"cmd_pose re(fus|ject)ed.*{said}"):
-        messages.goal_pose(wrong, "odom")
+        command_messages.goal_pose(wrong, "odom")
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
@@ -197,7 +197,7 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
     assert PREFIXED.base_frame == "robot1/base_link"
     estimate = ImuEstimate(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     assert messages.imu_message(estimate, STAMP, PREFIXED).header.frame_id == "robot1/imu_link"
-    assert messages.goal_pose(goal(frame="robot1/odom"), PREFIXED.odom_frame) == Pose()
+    assert command_messages.goal_pose(goal(frame="robot1/odom"), PREFIXED.odom_frame) == Pose()
 
 
 def test_joint_states_are_the_manuals_wheels() -> None:
@@ -271,4 +271,4 @@ def test_a_twist_that_is_not_finite_anywhere_is_refused_as_it_came(axis: str) ->
     twist.linear.y = 0.25
     setattr(getattr(twist, part), name, math.inf)
     with pytest.raises(CommandRefused, match=r"NaN or infinity.*(0\.25.*inf|inf.*0\.25)"):
-        messages.body_twist(twist)
+        command_messages.body_twist(twist)
