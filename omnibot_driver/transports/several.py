@@ -14,8 +14,8 @@ import os
 import select
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Final, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
 
 from omnibot_driver.core.errors import LinkError, PortInUse
 from omnibot_driver.core.packets import Packet, Packets, joined
@@ -24,24 +24,14 @@ from omnibot_driver.transports import (
     READ_TIMEOUT_S,
     WRITE_TIMEOUT_S,
     LinesChanged,
-    Transport,
 )
+from omnibot_driver.transports.line import ByteLine, Line, Opener
 from omnibot_driver.transports.wake_up import WakeUp
 
 FULL: Final = f"it has not accepted all data within {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
 """Time in s between two attempts to open a missing line. The attempts do not disturb other
 lines."""
-
-
-class ByteLine(Transport, Protocol):
-    """A ``Transport`` with a single channel, which carries bytes."""
-
-    def drop_output(self) -> None:
-        """Discard the written bytes that are not sent yet."""
-
-
-Opener = Callable[[], ByteLine]
 
 
 class Several:
@@ -178,7 +168,7 @@ class Several:
     def _ports(self) -> list[ByteLine]:
         return [line.port for line in self._lines if line.port is not None]
 
-    def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
+    def _shared_out(self, packets: Packets) -> Iterator[tuple[Line, bytes]]:
         """Yield each line once, with the joined bytes of all packets for this line.
 
         The lines are in the order of their first packets.
@@ -240,17 +230,17 @@ class Several:
         self._miss(line, why)
         self._give_back(line)
 
-    def _miss(self, line: "Line", why: str) -> None:
+    def _miss(self, line: Line, why: str) -> None:
         line.trouble, line.retry_at = why, time.monotonic() + self._retry_s
         self._changed = True
 
-    def _give_back(self, line: "Line") -> None:
+    def _give_back(self, line: Line) -> None:
         if line.descriptor is not None:
             del self._channels[line.descriptor]
             self._arrivals.unregister(line.descriptor)
         self._close(line)
 
-    def _close(self, line: "Line") -> None:
+    def _close(self, line: Line) -> None:
         with self._writing:
             port = line.end()
         # The lock is released, because ``close`` may wait until the kernel has sent its output.
@@ -261,83 +251,3 @@ class Several:
         """Raise LinkError if all lines are missing. It says why the first line is missing."""
         if len(self.missing) == len(self._lines):
             raise LinkError(self._lines[0].trouble)
-
-
-class Line:
-    """One of several lines.
-
-    ``trouble``: the reason why the line is missing; empty if it is present.
-
-    ``was_open``: whether the line is open, or has been open before.
-
-    ``waits``: the bytes that the line has not accepted yet.
-    """
-
-    def __init__(self, opener: Opener) -> None:
-        self.opener = opener
-        self.port: ByteLine | None = None
-        self.descriptor: int | None = None
-        self.trouble = "it is not open yet"
-        self.retry_at = 0.0
-        self.was_open = False
-        self.waits = b""
-        self.watched = False
-        """Whether ``poll`` is set to report when the line accepts bytes again."""
-        self._full_since = 0.0
-        self._overruns = self._earlier_overruns = 0
-
-    @property
-    def overruns(self) -> int | None:
-        """How often the kernel has lost bytes of this line; None if the kernel does not count.
-
-        Earlier connections are included.
-        """
-        if self.port is not None:
-            if (count := self.port.overruns) is None:
-                return None
-            self._overruns = count
-        return self._earlier_overruns + self._overruns
-
-    def begin(self, port: ByteLine) -> None:
-        """Use ``port``, which has just been opened, for this line."""
-        assert port.descriptors is not None
-        self.port, (self.descriptor,) = port, port.descriptors
-        self.trouble, self.waits, self.watched, self.was_open = "", b"", False, True
-        self._earlier_overruns += self._overruns
-        self._overruns = 0
-
-    def write(self, data: bytes, now: float) -> bool:
-        """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
-
-        If the line is missing, but its port is open, the port gets only the part of ``data`` that
-        it accepts at once. The result is then True.
-        """
-        if self.port is None:
-            return True
-        if self.trouble:
-            self.port.write_if_room(((0, data),))
-            return True
-        if not self.waits:
-            self._full_since = now
-        self.waits += data
-        return self.flush(now)
-
-    def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if bytes have waited for 0.2 s without a break.
-
-        All unsent bytes are then discarded.
-        """
-        assert self.port is not None
-        if self.waits and not self.trouble:
-            taken = self.port.write_if_room(((0, self.waits),))
-            self.waits = self.waits[taken:]
-            if self.waits and now - self._full_since >= WRITE_TIMEOUT_S:
-                self.waits = b""
-                self.port.drop_output()
-                return False
-        return True
-
-    def end(self) -> ByteLine | None:
-        """Forget the port and the waiting bytes; return the port, which the caller must close."""
-        port, self.port, self.descriptor, self.waits = self.port, None, None, b""
-        return port

@@ -166,7 +166,7 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
-    monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
+    monkeypatch.setattr("omnibot_driver.transports.line.WRITE_TIMEOUT_S", 0.0)
     lines.write(((0, b"old"),))
     assert list(lines.missing) == [0]
     assert list(changed(lines)) == [0]
@@ -181,7 +181,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
-    monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
+    monkeypatch.setattr("omnibot_driver.transports.line.WRITE_TIMEOUT_S", 0.0)
     lines.write(((0, b"old"),))
     assert lines.descriptors is not None
     assert [one is None for one in lines.descriptors] == [True, False]
@@ -191,7 +191,7 @@ def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A line is full. The data of two writes follows in order as soon as the other end reads."""
-    monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 60.0)
+    monkeypatch.setattr("omnibot_driver.transports.line.WRITE_TIMEOUT_S", 60.0)
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     lines.write(((0, b"one"),))
