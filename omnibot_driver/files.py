@@ -10,7 +10,10 @@ import os
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
-from typing import TextIO
+from typing import Final, TextIO
+
+CHECK_FOLDER: Final = "check that the folder in `record_directory` can be written"
+"""What the user can do if a record or a download is not saved."""
 
 
 def write_whole(

@@ -24,6 +24,7 @@ from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
 from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
+from omnibot_driver.files import CHECK_FOLDER
 from omnibot_driver.qos import DEEP
 
 LONGEST_S: Final = 120.0
@@ -100,14 +101,14 @@ class Recorder:
             path = folder / lois_ecu_records.file_name(kind, time.time())
             saved = lois_ecu_records.save(reading, path, partial(self._is_current, token))
         except Exception as error:  # the caller must get an answer
-            self._end_unsaved(token, reading, error)
+            self._end_unsaved(token, reading, f"{error}; {CHECK_FOLDER}")
             return
         if saved:
             if remark := lois_ecu_records.remark(reading):
                 self._node.get_logger().warning(remark)
             self._end(token, True, str(path.absolute()))
 
-    def _end_unsaved(self, token: Future | None, reading: RecordReading, error: Exception) -> None:
+    def _end_unsaved(self, token: Future | None, reading: RecordReading, error: object) -> None:
         name = NAMES[reading.record.kind]
         self._end(token, False, f"the {name} was received, but could not be saved: {error}")
 

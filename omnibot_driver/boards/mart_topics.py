@@ -34,7 +34,7 @@ from omnibot_driver.core.mart.readings import (
     SonarReading,
 )
 from omnibot_driver.core.session import Session
-from omnibot_driver.files import unused, write_whole
+from omnibot_driver.files import CHECK_FOLDER, unused, write_whole
 from omnibot_driver.qos import DEEP, LATCHED
 
 NAN: Final = float("nan")
@@ -185,7 +185,7 @@ class MartTopics:
                 write_whole(path, lambda file: file.write(done.content.decode("latin-1")))
                 answer.set_result((True, str(path)))
             except Exception as error:  # the caller must get an answer
-                answer.set_result((False, str(error)))
+                answer.set_result((False, f"{error}; {CHECK_FOLDER}"))
             if self._node.executor is not None:
                 self._node.executor.wake()
 

@@ -20,6 +20,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
+from omnibot_driver.files import CHECK_FOLDER
 from omnibot_driver.simulator.lois_ecu import QUIRKS
 
 Start = Callable[..., Any]
@@ -211,7 +212,8 @@ def test_a_record_is_a_file_and_an_estop_ends_one(
 ) -> None:
     """A user calls a record service. The answer is the path of the record's file.
 
-    If the e-stop interrupts a record, no file is written.
+    If the folder cannot be written, the answer says what to check. If the e-stop interrupts a
+    record, no file is written.
     """
     ecu = ecu_of("firmware", stack, running=True)
     folder = tmp_path / "records"
@@ -228,6 +230,7 @@ def test_a_record_is_a_file_and_an_estop_ends_one(
     answer = probe.call(Trigger, "record_heading")
     assert not answer.success
     assert "could not be saved" in answer.message
+    assert CHECK_FOLDER in answer.message, answer.message
     status = probe.listen(DiagnosticArray, "/diagnostics")
     for _ in range(20):
         status.clear()

@@ -22,6 +22,7 @@ from sensor_msgs.msg import BatteryState, Range
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
+from omnibot_driver.files import CHECK_FOLDER
 from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
@@ -166,7 +167,7 @@ def test_a_download_that_cannot_be_saved_ends_with_the_reason(
 ) -> None:
     """The folder for downloads is in the home directory of an unknown user.
 
-    A download fails with a reason, and the driver continues.
+    A download fails. The answer has the reason and the remedy, and the driver continues.
     """
     mart, folder = mart_of(stack), "~nobody_of_this_name/records"
     probe: Probe = probe_of(start_driver(mart.url, board="mart", record_directory=folder))
@@ -178,6 +179,7 @@ def test_a_download_that_cannot_be_saved_ends_with_the_reason(
         answer = probe.call(Trigger, "download_last_move")
         assert not answer.success
         assert "not saved" in answer.message, answer.message
+        assert CHECK_FOLDER in answer.message, answer.message
 
 
 def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
