@@ -54,6 +54,16 @@ PARAMETERS: Final = table(
         "command_rate": {
             "description": "Not used by this board: a motion continues without repeated commands."
         },
+        "odom_linear_scale": {
+            "description": "True distance divided by the distance that odom shows while this"
+            " parameter is 1. The driver multiplies measured distances by this ratio. The command"
+            " `calibrate scale` corrects metres_per_count instead."
+        },
+        "odom_angular_scale": {
+            "description": "True angle of a turn divided by the angle that odom shows after the"
+            " turn while this parameter is 1. The driver multiplies the angles of the controller's"
+            " gyro by this ratio. track corrects the angles that only the right wheel measures."
+        },
         "port": {
             "default": "udp://192.168.1.50:5000",
             "description": "Address of the controller, udp://host:port; the stop port has the next"
@@ -83,7 +93,7 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
         speed_per_unit=1.0 / values["linear_scale"],
         motor_balance=values["motor_balance"],
         nominal_volts=values["nominal_voltage"],
-        heading_sign=-1 if values["heading_inverted"] else 1,
+        heading_scale=values["odom_angular_scale"] * (-1 if values["heading_inverted"] else 1),
         network_delay_s=values["network_delay"],
         odom_rate_hz=values["odom_rate"],
         spin_speed=values["spin_speed"],
@@ -106,9 +116,9 @@ def opener(values: Mapping[str, Any]) -> Callable[[], UdpPorts]:
 
 def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
     """Return the kinematics of a left and a right wheel, with the calibrated sizes."""
-    linear, angular = values["odom_linear_scale"], values["odom_angular_scale"]
+    linear = values["odom_linear_scale"]
     return DifferentialKinematics(
-        wheel_radius_m=linear * values["wheel_radius"], track_m=linear / angular * values["track"]
+        wheel_radius_m=linear * values["wheel_radius"], track_m=linear * values["track"]
     )
 
 

@@ -58,7 +58,7 @@ class CorrectedPose:
 
         ``degrees``: this angle, with the server's sign.
         """
-        told_rad = math.radians(degrees) * self._settings.heading_sign
+        told_rad = math.radians(degrees) * self._settings.heading_scale
         self._correct_yaw(self.turn.tell(told_rad))
 
     def turn_recorded(self, degrees: float) -> bool:
@@ -66,7 +66,7 @@ class CorrectedPose:
 
         ``degrees``: this angle, with the server's sign. Return whether the angle was used.
         """
-        told_rad = math.radians(degrees) * self._settings.heading_sign
+        told_rad = math.radians(degrees) * self._settings.heading_scale
         spun_rad = self.turn.spun_rad
         wrong_rad = self.turn.record(told_rad)
         if wrong_rad is None:

@@ -49,6 +49,7 @@ class Done:
     * ``stopped_again``: whether the driver has sent a stop after the move, against a second run.
     * ``slowness``: usual time for a distance or turn, relative to a robot with the default
       settings.
+    * ``gyro_scale``: true turn divided by the turn that the server's gyro measures.
     """
 
     request: Request
@@ -60,6 +61,7 @@ class Done:
     stopped_again: bool
     expected: float
     slowness: float = 1.0
+    gyro_scale: float = 1.0
 
     @property
     def is_straight(self) -> bool:
@@ -70,7 +72,7 @@ class Done:
     def asked(self) -> float:
         """The requested distance in m, or turn in rad."""
         number = float(self.request.data.split()[-1])
-        return number * INCH_M if self.is_straight else math.radians(number)
+        return number * INCH_M if self.is_straight else self.gyro_scale * math.radians(number)
 
     @property
     def _least(self) -> float:

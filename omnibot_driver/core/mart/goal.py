@@ -191,7 +191,7 @@ def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) 
 def _turn(
     angle_rad: float, near_rad: float, settings: MartSettings, surplus: Surplus
 ) -> Request | None:
-    wanted = abs(math.degrees(angle_rad))
+    wanted = abs(math.degrees(angle_rad) / settings.heading_scale)
     normal_radps = 2 * NORMAL_UNITS * settings.speed_per_unit / settings.track_m
     slow = normal_radps > settings.max_yaw_rate_radps or wanted < SLOW_BELOW_DEG
     degrees = surplus.degrees(wanted, slow=slow)

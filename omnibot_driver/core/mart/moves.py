@@ -144,7 +144,7 @@ class Moves(Asking):
         # nothing is learned from a slow stop before the requested distance: an obstacle may have
         # ended the move
         if not (self._rolled and abs(self.odometry.moved_m) < asked_m):
-            self._surplus.learn(move, self.odometry.moved_m, self.odometry.turn.spun_rad)
+            self._surplus.learn(move, self.odometry.moved_m, self._spun_by_gyro_rad)
 
     def _use_turn_record(self) -> None:
         """Correct the heading by the record of the last turn, if its download has ended."""
@@ -160,7 +160,7 @@ class Moves(Asking):
             if degrees is not None and odometry.turn_recorded(degrees):
                 wheel_rad = spun_rad / (2.0 if ratio is None else 1.0 - ratio)
                 self._records.used(odometry.turn.spun_rad, wheel_rad)
-        self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
+        self._surplus.learn(turn, 0.0, self._spun_by_gyro_rad)
 
     def _end_move(self, now: float) -> None:
         """End a motion after its last encoder count. If it was a controlled move, evaluate it."""
@@ -190,7 +190,7 @@ class Moves(Asking):
             self._move.fail()
             self._notice(WRONG_WAY + DISCARDED, halt=True)
         elif twice:
-            self.odometry.run_before(done.is_straight, self._surplus.expected(move))
+            self.odometry.run_before(done.is_straight, self._expected(move))
             self._notice(RAN_TWICE, halt=False)
         elif completed and likely and doubtful and done.is_large:
             self._discard_goal()
@@ -198,6 +198,17 @@ class Moves(Asking):
             self._stop_contradicted(done)
         elif completed and not (stopped and doubtful):
             self._learn_from(move, now)
+
+    @property
+    def _spun_by_gyro_rad(self) -> float:
+        """The last turn as the server's gyro measures it, in rad. Its sign does not matter."""
+        return self.odometry.turn.spun_rad / self._settings.heading_scale
+
+    def _expected(self, move: Request) -> float:
+        """Return the true distance forward in m, or turn to the left in rad, of a complete move."""
+        turns = move.word in (words.MCR, words.MCL)
+        scale = abs(self._settings.heading_scale) if turns else 1.0
+        return scale * self._surplus.expected(move)
 
     def _done(self, move: Request, now: float, *, completed: bool) -> Done:
         free_s = min(now, self._port_free_s)
@@ -211,10 +222,11 @@ class Moves(Asking):
             self.odometry.turn.spun_rad,
             lasted_s=self._rested_s - self._started_s,
             quiet_s=free_s - self._rested_s + self._delay_s,
-            expected=abs(self._surplus.expected(move)),
+            expected=abs(self._expected(move)),
             completed=completed,
             stopped_again=self._copies_stopped_s >= self._rested_s,
             slowness=slowness,
+            gyro_scale=abs(ours.heading_scale),
         )
 
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:

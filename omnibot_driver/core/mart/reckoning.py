@@ -190,12 +190,12 @@ class Reckoning(CorrectedPose):
         if when.from_s < self._began_s:
             return False
         known = self.heading.is_known
-        angle_rad = math.radians(degrees) * self._settings.heading_sign
+        angle_rad = math.radians(degrees)
         turn_rad = min(ANY_RAD, self.heading.doubt_rad(angle_rad, when.at_s))
         if turn_rad and self.motion is not Motion.NONE:
             way_m = self._fastest_mps * (when.at_s - self.heading.told_s) * min(1.0, turn_rad)
             self.doubt.add(way_m**2, turn_rad**2)
-        changed = self.heading.tell(angle_rad, when, self._stood_s)
+        changed = self.heading.tell(angle_rad, when, self._stood_s, self._settings.heading_scale)
         if not known and self.heading.is_known and self.motion is Motion.REFERENCE:
             self.doubt.add(0.0, (BEGIN_RADPS * (when.at_s - self._began_s)) ** 2)
         return changed

@@ -103,10 +103,13 @@ class RelativeHeading:
         """
         self._before_rad = 0.0
 
-    def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:
+    def tell(self, angle_rad: float, when: Moment, stood_s: float, scale: float = 1.0) -> bool:
         """Process a reported heading; return whether it is plausible and has changed.
 
         ``stood_s``: time at which the robot was stopped, infinite while it is driven.
+
+        ``scale``: true turn to the left divided by the change of the reported heading. It may
+        change during a motion, without a turn.
         """
         if not abs(angle_rad) < MOST_RAD:
             self.forget()
@@ -127,7 +130,7 @@ class RelativeHeading:
             self._take(angle_rad, when)
             self.from_s = when.from_s
             return False
-        turn_rad = angle_rad - before_rad
+        turn_rad = scale * (angle_rad - before_rad)
         moved_s = max(0.0, min(at_s, stood_s) - before_s)
         late_s = moved_s + when.spread_s
         most_rad = DOUBT_RAD + min(ACCELERATION_RADPS2 * late_s**2 / 2, MOST_RADPS * late_s)

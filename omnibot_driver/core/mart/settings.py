@@ -21,7 +21,8 @@ class MartSettings:
     ``motor_balance``: speed of the left motor divided by the speed of the right motor, at equal
     units.
 
-    ``heading_sign``: 1 if the server's relative angle increases to the left, otherwise -1.
+    ``heading_scale``: true angle divided by the server's angle, which comes from its gyro; negative
+    if the server's relative angle increases to the right.
 
     ``network_delay_s``: longest time in s from the sending of a datagram to its arrival.
 
@@ -41,7 +42,7 @@ class MartSettings:
     speed_per_unit: float = 0.0085
     motor_balance: float = 1.0
     nominal_volts: float = 24.0
-    heading_sign: int = 1
+    heading_scale: float = 1.0
     network_delay_s: float = 0.3
     odom_rate_hz: float = 20.0
     spin_speed: Literal["custom", "fixed"] = "custom"

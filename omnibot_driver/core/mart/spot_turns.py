@@ -219,7 +219,7 @@ class SpotTurns:
         expected_rad = self._odometry.turn.spun_rad + self._rate_radps * unseen_s
         if abs(reply.number) <= 1 and abs(expected_rad) > UNSURE_RAD:
             return True  # maybe the reply to MCSTAT or to a sonar query
-        told_rad = math.radians(reply.number) * self.settings.heading_sign
+        told_rad = math.radians(reply.number) * self.settings.heading_scale
         most_rad = UNSURE_RAD + UNSURE_PART * abs(expected_rad) + abs(self._rate_radps) * 2 * trip_s
         return abs(told_rad - expected_rad) > most_rad
 
@@ -246,7 +246,7 @@ class SpotTurns:
         # whole degrees are more precise than the wheel if the turn is long
         if degrees is not None and abs(spun_rad) > TOLD_RAD:
             whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
-            rate_radps *= abs(math.radians(degrees)) / whole_rad
+            rate_radps *= abs(self.settings.heading_scale * math.radians(degrees)) / whole_rad
         self._undo_false_lesson(abs(rate_radps / self._rate_radps))
         self._loop.spun(self.units, self._lesson(rate_radps))
         self._has_learned = True

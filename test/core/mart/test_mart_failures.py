@@ -114,7 +114,7 @@ def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> 
     ("encoder_sign", "settings", "parameter"),
     [
         (-1, MartSettings(), "encoder_inverted"),
-        (1, MartSettings(heading_sign=-1), "heading_inverted"),
+        (1, MartSettings(heading_scale=-1), "heading_inverted"),
         (1, MartSettings(metres_per_count=0.001), "metres_per_count"),
     ],
 )

@@ -228,7 +228,7 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
         odometry.counted(20 * tenth, at(1.15 + tenth / 10))
     odometry.counted(260, at(2.65))
     turn_rad = 0.5
-    odometry.turned(math.degrees(turn_rad) * settings.heading_sign, at(2.7))
+    odometry.turned(math.degrees(turn_rad) * settings.heading_scale, at(2.7))
     odometry.counted(262, at(2.75))
     way_m = 202 * settings.metres_per_count - turn_rad * settings.track_m / 2
     assert odometry.pose.yaw_rad == pytest.approx(turn_rad, abs=0.03)
