@@ -77,7 +77,7 @@ class Serializer:
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
         """Return the CDR bytes of an ``odom`` message with this estimate and stamp."""
-        pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance
+        pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance.of_direction
         half_rad = pose.yaw_rad / 2
         moving, twist_noise = AT_REST, messages.TWIST_NOT_KNOWN
         if twist is not None:

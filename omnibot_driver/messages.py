@@ -89,7 +89,7 @@ def odometry_message(
     estimate: OdometryEstimate, stamp: Time, settings: MessageSettings
 ) -> Odometry:
     """Return an ``odom`` message: pose in the odometry frame, twist in the base's own axes."""
-    pose, twist, covariance = estimate.pose, estimate.twist, estimate.covariance
+    pose, twist, covariance = estimate.pose, estimate.twist, estimate.covariance.of_direction
     message = Odometry(
         header=Header(stamp=stamp, frame_id=settings.odom_frame),
         child_frame_id=settings.base_frame,

@@ -7,6 +7,7 @@ REP-103, REP-105 and REP-145 say where each number has to be.
 
 import math
 
+import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, Twist
@@ -121,7 +122,7 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
         0.0,
         Pose(1.0, 2.0, math.pi / 2),
         BodyTwist(0.1, 0.2, 0.3),
-        Covariance(xx=11.0, xy=12.0, x_yaw=16.0, yy=22.0, y_yaw=26.0, yaw_yaw=66.0),
+        Covariance(xx=11.0, xy=12.0, x_yaw=1.6, yy=22.0, y_yaw=2.6, yaw_yaw=3.0),
     )
     message = messages.odometry_message(estimate, STAMP, SETTINGS)
     assert (message.header.frame_id, message.child_frame_id) == ("odom", "base_link")
@@ -135,14 +136,32 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
     pose = message.pose.covariance.reshape(6, 6)
     assert pose[0, 0] == 11.0
     assert pose[0, 1] == pose[1, 0] == 12.0
-    assert pose[0, 5] == pose[5, 0] == 16.0
+    assert pose[0, 5] == pose[5, 0] == 1.6
     assert pose[1, 1] == 22.0
-    assert pose[1, 5] == pose[5, 1] == 26.0
-    assert pose[5, 5] == 66.0
+    assert pose[1, 5] == pose[5, 1] == 2.6
+    assert pose[5, 5] == 3.0
     assert pose[2, 2] == pose[3, 3] == pose[4, 4] == messages.UNMEASURED_VARIANCE
     twist = message.twist.covariance.reshape(6, 6)
     assert twist[0, 0] == twist[1, 1] == pytest.approx(0.02**2)
     assert twist[5, 5] == pytest.approx(0.025**2)
+
+
+def test_an_unknown_heading_is_published_with_the_variance_of_an_unknown_direction() -> None:
+    """The variance of the yaw is 66 rad², more than a quaternion can be wrong.
+
+    ``odom`` has π²/3 rad². The errors of the position stay, and the matrix is positive definite.
+    """
+    estimate = OdometryEstimate(
+        0.0,
+        Pose(),
+        None,
+        Covariance(xx=11.0, xy=1.0, x_yaw=16.0, yy=22.0, y_yaw=26.0, yaw_yaw=66.0),
+    )
+    message = messages.odometry_message(estimate, STAMP, SETTINGS)
+    pose = message.pose.covariance.reshape(6, 6)
+    assert pose[5, 5] == pytest.approx(math.pi**2 / 3)
+    assert (pose[0, 0], pose[0, 1], pose[1, 1]) == (11.0, 1.0, 22.0)
+    assert min(np.linalg.eigvalsh(pose)) > 0.0
 
 
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:

@@ -21,6 +21,8 @@ from omnibot_driver.core.values import value
 
 INITIAL_VARIANCE: Final = 1e-6
 """Initial variances of (1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
+UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
+"""Variance of a direction of which nothing is known, in rad²."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +92,25 @@ class Covariance:
             self.yy + yy,
             self.y_yaw + y_yaw,
             self.yaw_yaw + yaw_yaw,
+        )
+
+    @property
+    def of_direction(self) -> "Covariance":
+        """The covariance if the yaw is regarded as a direction, as in a quaternion.
+
+        Whole turns do not change a direction. So the variance of the yaw is at most that of an
+        unknown direction, and an uncertain direction says less about the position.
+        """
+        if self.yaw_yaw <= UNKNOWN_YAW_VARIANCE:
+            return self
+        part = UNKNOWN_YAW_VARIANCE / self.yaw_yaw
+        return Covariance(
+            self.xx,
+            self.xy,
+            part * self.x_yaw,
+            self.yy,
+            part * self.y_yaw,
+            UNKNOWN_YAW_VARIANCE,
         )
 
     def carried(self, dx_m: float, dy_m: float) -> "Covariance":
