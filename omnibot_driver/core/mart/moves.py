@@ -20,6 +20,7 @@ from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
 from omnibot_driver.core.mart.stopping import SLOW_STOP
+from omnibot_driver.core.mart.turn_angle import is_of_another
 from omnibot_driver.core.mart.words import Request
 
 UNLIKELY: Final = 1 / 3
@@ -33,9 +34,10 @@ RAN_TWICE: Final = (
     " of the move instead: check the network"
 )
 CONTRADICTED: Final = (
-    "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"
-    " may be stuck or slip, so the heading is uncertain"
+    "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: "
 )
+STUCK: Final = "one wheel may be stuck or slip, so the heading is uncertain"
+OPPOSITE: Final = "the directions are opposite; check `heading_inverted` and `encoder_inverted`"
 WRONG_WAY: Final = (
     "the right wheel turned against the direction of a controlled move: check `encoder_inverted`,"
     " and the wiring of motors and encoder"
@@ -169,9 +171,11 @@ class Moves(Asking):
         if move is None:
             wrong_rad = self.odometry.rest()
             if wrong_rad and not self.conversation.disturbed(now):
-                spun_deg = math.degrees(self.odometry.turn.spun_rad)
-                told_deg = spun_deg - math.degrees(wrong_rad)
-                self._notice(CONTRADICTED.format(told_deg, spun_deg), halt=False)
+                spun_rad = self.odometry.turn.spun_rad
+                told_rad = spun_rad - wrong_rad
+                why = STUCK if is_of_another(told_rad + spun_rad, spun_rad) else OPPOSITE
+                angles = math.degrees(told_rad), math.degrees(spun_rad)
+                self._notice(CONTRADICTED.format(*angles) + why, halt=False)
             return
         done = self._done(move, now, completed=completed)
         stopped = self._may_have_stopped_a_copy(done, now)
@@ -247,7 +251,7 @@ class Moves(Asking):
         if self._move is not None:
             self._move.fail()
         asked_deg, seen_deg = math.degrees(done.asked), math.degrees(abs(done.turned_rad))
-        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + DISCARDED, halt=True)
+        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + STUCK + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
         """Discard the goal, because the network may have delivered its last move twice."""

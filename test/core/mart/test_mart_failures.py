@@ -131,6 +131,26 @@ def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
     assert any(f"check `{parameter}`" in notice for notice in bench.notices)
 
 
+@pytest.mark.parametrize(
+    ("encoder_sign", "settings"), [(-1, MartSettings()), (1, MartSettings(heading_scale=-1))]
+)
+def test_opposite_angles_of_gyro_and_wheel_are_told_by_the_parameters_that_invert_them(
+    encoder_sign: int, settings: MartSettings
+) -> None:
+    """The encoder or the heading has a wrong sign. The robot turns on the spot.
+
+    The notice about the two angles names both parameters, and does not suspect a stuck wheel.
+    """
+    bench = MartBench("source", settings=settings, encoder_sign=encoder_sign).ready()
+    bench.command(0.0, 0.5, 3.0)
+    bench.run(3.0)
+    told = [notice for notice in bench.notices if "has measured a turn of" in notice]
+    assert told
+    for notice in told:
+        assert "check `heading_inverted` and `encoder_inverted`" in notice
+        assert "stuck" not in notice
+
+
 def test_another_server_is_refused_by_its_name() -> None:
     """A different server answers HELLO with its own name.
 
