@@ -8,8 +8,8 @@ The measure is the normalised squared error (NEES), whose mean is 3 for a right 
 Results: docs/internals/mart_odometry.md.
 """
 
+import argparse
 import math
-import sys
 from collections.abc import Iterator
 from random import Random
 from statistics import mean, median
@@ -81,7 +81,9 @@ def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[
 
 def main() -> None:
     """Print a row of results for each kind of network, without and with goals."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("drives", nargs="?", type=int, default=20, help="for each network")
+    count = parser.parse_args().drives
     print(
         "| Network | Motions | Mean at the end | Mean | Median | Beyond 16.3 |\n" + "|---" * 6 + "|"
     )

@@ -6,7 +6,7 @@
 network. Results: docs/internals/mart_searches.md.
 """
 
-import sys
+import argparse
 from random import Random
 from typing import NamedTuple
 
@@ -77,7 +77,9 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
 
 def main() -> None:
     """Print a row of results for each kind of network."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("drives", nargs="?", type=int, default=20, help="for each network")
+    count = parser.parse_args().drives
     print(
         "| Network | Robot at rest at the end, server answers |"
         " Longest time from a stop to standstill | Mean distance |\n" + "|---" * 4 + "|"

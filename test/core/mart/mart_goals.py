@@ -6,8 +6,8 @@
 for each network. Results: docs/internals/mart_protocol.md.
 """
 
+import argparse
 import math
-import sys
 from collections.abc import Callable
 from random import Random
 
@@ -111,7 +111,9 @@ def random_goal(random: Random) -> Pose:
 
 def main() -> None:
     """Print a row of results for each kind of network."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("runs", nargs="?", type=int, default=10, help="for each network")
+    count = parser.parse_args().runs
     print(
         "| Network | Goals reached | Discarded | Largest error of the odometry |\n"
         + "|---" * 4

@@ -7,7 +7,7 @@
 Results: docs/internals/mart_searches.md.
 """
 
-import sys
+import argparse
 import time
 from functools import cache
 from typing import Final, NamedTuple
@@ -127,7 +127,9 @@ def _way(world: World, came: dict[World, tuple[World, str] | None]) -> list[str]
 
 
 if __name__ == "__main__":
-    model.MOST_COPIES = int(sys.argv[1]) if len(sys.argv) > 1 else model.MOST_COPIES  # type: ignore[misc]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("copies", nargs="?", type=int, default=model.MOST_COPIES)
+    model.MOST_COPIES = parser.parse_args().copies  # type: ignore[misc]
     began_s = time.monotonic()
     result = search()
     print(f"{result.worlds} worlds, {result.steps} steps, {time.monotonic() - began_s:.1f} s")

@@ -9,11 +9,11 @@ a driver starts while the server may be executing a command.
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
 
+import argparse
 import copy
 import heapq
 import math
 import os
-import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -277,7 +277,9 @@ def main() -> None:
     The names are ``pairs`` (sequences of two wishes), ``eights`` (sequences of eight wishes) and
     ``beginnings`` (starts of a driver).
     """
-    for name in sys.argv[1:] or SETS:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sets", nargs="*", choices=tuple(SETS), help="default: all sets")
+    for name in parser.parse_args().sets or SETS:
         began_s = time.monotonic()
         trials = list(SETS[name]())
         bad = search(trials)
