@@ -2,6 +2,7 @@
 
 """Tests of how odometry follows a restart of the board, and how it is reset."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -153,6 +154,34 @@ def test_a_board_that_restarts_goes_on_from_here(
         )
         assert odometry.displace(reading, 0.0) == []
     assert last(odometry.settle(trip.pose)) == close(trip.truth, 1e-8)
+
+
+@pytest.mark.parametrize("frame", ["earth", "body"])
+@pytest.mark.parametrize("lost_m", [0.0, 0.1])
+def test_a_disproved_restart_leaves_no_more_uncertainty_than_the_motion_that_was_lost(
+    lost_m: float, frame: str
+) -> None:
+    """The counter seems to have restarted, but the next pose shows that the board has not.
+
+    ``use_board_pose`` is False, so the pose does not correct odom. Motion by ``lost_m`` is missing
+    in odom. The covariance contains an error of this size in any direction, and no more.
+
+    Bug: after such a suspicion, the yaw was uncertain by 0.3 rad for good.
+    """
+    odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip(0.7)
+    attach(odometry, trip.pose)
+    odometry.displace(trip.move(0.002, 0.0, 0.0, frame), 0.0)
+    trip.move(lost_m, 0.0, 0.0)
+    reading = trip.move(0.0, 0.0, 0.0, frame)
+    odometry.displace(replace(reading, duration_s=None, restarted=True), 1.0)
+    odometry.settle(trip.pose)
+    odometry.settle(trip.pose)
+    estimates = odometry.displace(trip.move(0.0, 0.0, 0.0, frame), 1.0 + PERIOD_S)
+    assert last(estimates) == close((0.002, 0.0, 0.0))
+    covariance = estimates[-1].covariance
+    assert math.sqrt(covariance.xx) == pytest.approx(lost_m, abs=0.005)
+    assert math.sqrt(covariance.yy) == pytest.approx(lost_m, abs=0.005)
+    assert math.sqrt(covariance.yaw_yaw) == pytest.approx(0.0, abs=0.005)
 
 
 def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:

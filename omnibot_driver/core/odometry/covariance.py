@@ -210,6 +210,14 @@ class Uncertainty:
         """Remove the uncertainty of all gaps, because the motion in them is known now."""
         self.gap = self._halt = NOTHING
 
+    def bound(self, way_m: float, turn_rad: float) -> None:
+        """Replace the uncertainty of all gaps, because the error that they have caused is known.
+
+        ``way_m``, ``turn_rad``: this error, which is not corrected.
+        """
+        self.gap = Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
+        self._halt = NOTHING
+
     def give_up(self) -> None:
         """Make the uncertainty of all gaps permanent, because the motion in them stays unknown."""
         self._walk += self.gap + self._halt

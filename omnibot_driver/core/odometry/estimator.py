@@ -177,6 +177,7 @@ class Odometry:
         if not self._gate.possible(told):
             return []
         since_gap, self._since_gap, self._gap_lost = self._since_gap, None, 0
+        suspected = self._frame.since_restart is not None
         confirmed = self._gate.confirmed(told, self._track.uncertainty.gap)
         restarted = reading.restarted and (
             bool(self._backlog) or not self._frame.continues(told, self._track.uncertainty.gap)
@@ -205,6 +206,8 @@ class Odometry:
             self._reckoning.bridge_until_pose(lost)
         if self._settings.use_board_pose:
             self._judge(told, confirmed)
+        elif suspected:  # the board has not restarted
+            self._track.bound(log_of(self._frame.pose.way_to(told)))
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:

@@ -114,6 +114,15 @@ class PoseTracker:
         self.follower.correct(roll(_times(tangent, self._signed_size)))
         self.uncertainty.settle()
 
+    def bound(self, tangent: Pose) -> None:
+        """Replace the uncertainty of all gaps until now.
+
+        ``tangent``: the error that the gaps have caused. A pose of the board has shown this error,
+        but the settings forbid to correct it.
+        """
+        error = _times(tangent, self._size)
+        self.uncertainty.bound(error.way_m, error.yaw_rad)
+
     def _part(self, tangent: Pose) -> Pose:
         """Add a tangent to ``rolled`` and to the uncertainty; return it in REP-103's axes."""
         self.rolled += _times(tangent, self._size)
