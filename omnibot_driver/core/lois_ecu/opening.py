@@ -62,6 +62,10 @@ MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
 boot, which takes two seconds."""
+RESYNC: Final = b"::"
+"""Characters between a line with a checksum and one without. To a board that expects no checksums,
+the first line is too long, and its end stays in the board's memory. If the second line then lost
+its only ``:`` and one more character, both could form a motion command."""
 
 
 class SettingsWriter:
@@ -241,14 +245,16 @@ class SettingsWriter:
         Two commands are exceptions:
 
         * A terminal mode gets two lines while the settings are unconfirmed. The first line has a
-          checksum: a board that has just booted obeys only lines with a checksum.
-        * Stop has a checksum only if the user's setting is to send none (see ``_begin_round``).
+          checksum: a board that has just booted obeys only lines with a checksum. If no motion is
+          commanded, Stop follows, because the board may have ignored the Stops before.
+        * Stop never has a checksum (see ``_begin_round``).
         """
         if command == outbound.STOP:
-            return encode_command(command, with_sum=not self.settings.with_sum)
+            return encode_command(command, with_sum=False)
         line = outbound.lines(command, with_sum=self.settings.with_sum)
         if isinstance(command, SetTerminalMode) and not self.confirmed:
-            return encode_command(command, with_sum=True) + line
+            stop = [] if self._points.driving else [outbound.STOP]
+            line = _both_forms(command) + outbound.lines(*stop, with_sum=False)
         return line
 
     def _begin_round(self, now: float) -> None:
@@ -256,10 +262,11 @@ class SettingsWriter:
 
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
-        The driver sends lines with a checksum, or without one (``checksum``). Another program may
-        have set the board to the opposite while the robot rolls. The board then ignores the
-        driver's usual Stops. So while the settings are unconfirmed, each of the first ``ROUNDS``
-        rounds begins with an opposite Stop: without a checksum, or with one.
+        Another program may have switched the board's checksums off while the robot rolls. The board
+        then ignores a Stop with a checksum. So while the settings are unconfirmed, each of the
+        first ``ROUNDS`` rounds begins with a Stop without one. With ``checksum: false``, the mode
+        comes first, then a Stop without a checksum (see ``_encoded``). A Stop with a checksum would
+        be dangerous: if two of its zeros were lost, its checksum would command a duty.
         """
         if self._queue or not self._rounds_left:
             return
@@ -267,7 +274,7 @@ class SettingsWriter:
         self._rounds += 1
         self._round_at_s = max(now, self._round_at_s) + ROUND_S
         at_s = now
-        if self._rounds <= ROUNDS and not self.confirmed:
+        if self.settings.with_sum and self._rounds <= ROUNDS and not self.confirmed:
             self._queue.append((now, outbound.STOP))
             at_s += LINE_S  # a write of its own: its beginning must not meet the end of a setting
         # The board sends no dates after a boot. So each round requests one date.
@@ -307,9 +314,11 @@ class SettingsWriter:
         correction = encode_command(
             left_short_correction(self.settings), with_sum=self.settings.with_sum
         )
-        return (
-            encode_command(back, with_sum=True) + encode_command(back, with_sum=False) + correction
-        )
+        return _both_forms(back) + correction
+
+
+def _both_forms(mode: SetTerminalMode) -> bytes:
+    return encode_command(mode, with_sum=True) + RESYNC + encode_command(mode, with_sum=False)
 
 
 def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
