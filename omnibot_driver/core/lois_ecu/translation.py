@@ -136,11 +136,11 @@ class Translation:
                 return [FixReading(latitude, longitude, located and self._gps_clock.dated)]
             case GpsDate():
                 counts.time.sent(1)
-                self._gps_clock.set_date(report)
+                self._gps_clock.set_date(report, now)
             case GpsTime():
                 counts.time.sent(1)
                 self._gps_works |= report != MIDNIGHT
-                return [TimeReading(self._gps_clock.utc_s(report))]
+                return [TimeReading(self._gps_clock.utc_s(report, now))]
             case Heading(heading_deg):
                 counts.time.sent(1)
                 return self._heading(heading_deg)

@@ -81,6 +81,28 @@ def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
     assert after == TimeReading(before.utc_s + 3)
 
 
+def test_after_a_day_without_a_time_the_old_date_is_not_used() -> None:
+    """The board reports the time, then nothing for 25 hours, and then the time again.
+
+    The old date is wrong by a day, so the time is unknown until a new date arrives.
+    """
+    ecu = LoisConversation(LoisEcuSettings())
+    said = encode_report(GpsDate(26, 11, 22)) + encode_report(GpsTime(9, 0, 0))
+    assert ecu.receive(said, 0.0) != [TimeReading(None)]
+    later_s = 25 * 3600.0
+    assert ecu.receive(encode_report(GpsTime(10, 0, 0)), later_s) == [TimeReading(None)]
+    said = encode_report(GpsDate(26, 11, 23)) + encode_report(GpsTime(10, 0, 1))
+    assert ecu.receive(said, later_s + 1.0) != [TimeReading(None)]
+
+
+@pytest.mark.parametrize("day", [GpsDate(26, 2, 31), GpsDate(26, 2, 29), GpsDate(26, 4, 31)])
+def test_a_date_that_the_calendar_does_not_have_is_not_used(day: GpsDate) -> None:
+    """The board reports the 31st of February. The driver does not make the 3rd of March of it."""
+    ecu = LoisConversation(LoisEcuSettings())
+    found = ecu.receive(encode_report(day) + encode_report(GpsTime(9, 0, 0)), 0.0)
+    assert found == [TimeReading(None)]
+
+
 def test_declination_turns_the_heading() -> None:
     """A declination is set, positive to the east. The yaw is pi/2 − (heading + declination)."""
     ecu = LoisConversation(LoisEcuSettings(declination_rad=0.1))
