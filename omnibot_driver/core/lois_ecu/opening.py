@@ -62,6 +62,9 @@ MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
 boot, which takes two seconds."""
+UNANSWERED_S: Final = 5.0
+"""Time in s after which the driver restores the board's mode if no date has arrived, although the
+board sends. On a bad line, there may be too few ticks for more rounds."""
 RESYNC: Final = b"::"
 """Characters between a line with a checksum and one without. To a board that expects no checksums,
 the first line is too long, and its end stays in the board's memory. If the second line then lost
@@ -78,6 +81,7 @@ class SettingsWriter:
         self.settings = settings
         self._points = points
         self._in_period = self._answered = False
+        self._begun_at_s = math.inf
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
         """Commands that are not settings, for example for the LED. Each has the earliest time at
@@ -113,6 +117,11 @@ class SettingsWriter:
         True if they are still unconfirmed after twice the usual number of rounds.
         """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
+
+    @property
+    def unanswered_since_s(self) -> float:
+        """Time in s of the last ``begin``; infinity once a date has arrived since then."""
+        return math.inf if self._answered else self._begun_at_s
 
     @property
     def wake_at(self) -> float:
@@ -155,6 +164,7 @@ class SettingsWriter:
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now
+        self._begun_at_s = now
         self._rounds = self._repeated = 0
         self._in_period = self._answered = False
 
@@ -305,7 +315,10 @@ class SettingsWriter:
         )
 
     def recovery(self) -> bytes:
-        """Return the lines that restore the mode of a board that is silent or does not obey."""
+        """Return the lines that restore the mode of a board that is silent or does not obey.
+
+        Stop follows, so the caller must not call this method while motion is commanded.
+        """
         self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
         # The mode is sent with and without a checksum, because the board's setting may be
@@ -314,7 +327,9 @@ class SettingsWriter:
         correction = encode_command(
             left_short_correction(self.settings), with_sum=self.settings.with_sum
         )
-        return _both_forms(back) + correction
+        # Before, the board may have obeyed a damaged line, and ignored each Stop after it.
+        stop = outbound.lines(outbound.STOP, outbound.STOP, with_sum=self.settings.with_sum)
+        return _both_forms(back) + correction + stop
 
 
 def _both_forms(mode: SetTerminalMode) -> bytes:

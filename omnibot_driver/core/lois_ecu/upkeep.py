@@ -9,7 +9,7 @@ import math
 
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.messages import SetTerminalMode, TerminalMode
-from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, SettingsWriter
+from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, UNANSWERED_S, SettingsWriter
 from omnibot_driver.core.lois_ecu.record_request import RecordRequest
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -111,7 +111,10 @@ class Upkeep:
         if self.change.sensor_wanted or self.change.terminal or self._points.driving:
             return math.inf
         silent_since_s = self._recovered_at_s if self.writer.ignored else self.heard_at_s
-        return max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S
+        return min(
+            max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S,
+            max(self.writer.unanswered_since_s, self._recovered_at_s) + UNANSWERED_S,
+        )
 
 
 def _written(settings: LoisEcuSettings) -> tuple[object, ...]:

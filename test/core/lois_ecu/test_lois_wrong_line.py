@@ -68,3 +68,27 @@ def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     bench.run(8.0)
     bench.drive_on(seconds=2.0)
     assert not robot.stands
+
+
+def test_a_board_without_checksums_is_set_right_although_its_ticks_are_lost() -> None:
+    """Another program has switched the board's checksums off, and the line loses all tick reports.
+
+    The driver corrects the setting within ten seconds, and sends a Stop that the board obeys.
+
+    Bug: the driver waited for ticks, so the board never obeyed a Stop again. If two characters of a
+    Stop were lost, its checksum became the duty of a wheel.
+    """
+    _, robot = MAKERS["lois_ecu"]()
+    robot.board.receive(b":11000000043e\n")
+    bench = AnyBench(LoisEcuBoard(LoisEcuSettings()), robot)
+    bench.speaks = False
+    bench.run(3.0)
+    bench.open()
+    robot.board.commands.clear()
+    for _ in range(round(10.0 / TICK_S)):
+        bench.run(TICK_S)
+        bench.session.inbound.receive(b":100000005a6f\n", bench.now)
+    assert robot.board._reader.checks
+    bench.run(1.0)
+    mode = [(one.command, one.payload) for one in robot.board.commands]
+    assert (1, 0) in mode[mode.index((0x11, 0)) :]
