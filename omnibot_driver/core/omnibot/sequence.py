@@ -189,7 +189,7 @@ class Sequence:
         self._regular = self._regular or 0 < passed == counted
         if not self._regular:
             return Step(0)
-        most_off: float = 2 * self._per_pose
+        most_off = 2.0 * self._per_pose
         if renewed:  # the time shows where the old counter would be now
             counted = round(elapsed_s / self._period_s)
             most_off = (LATE_S + DRIFT * elapsed_s) / self._period_s
