@@ -8,6 +8,7 @@ knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
+from collections import Counter
 from typing import Final
 
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
@@ -26,6 +27,11 @@ ROUNDS: Final = 3
 """Number of stop commands that the driver sends to the command port before it uses the stop
 port."""
 STOP_PORT_TIMES: Final = 3
+SURPLUS: Final = 4
+"""A server may answer both SRM and SM by 'no motion' if no motion is in progress. After ROUNDS
+rounds, the driver then requires this number of replies more than rounds. Then SRM was answered too,
+unless each SRM was lost and several replies to SM were duplicated.
+"""
 ANSWERS: Final = {
     Motion.REFERENCE: (Form.NOTHING,),
     Motion.REVERSE: (Form.NOTHING,),
@@ -84,6 +90,8 @@ class Stopping:
     standstill is wanted.
 
     ``rounds``: how often the stop was sent to the command port.
+
+    ``strange``: the last failure that does not answer a stop command; empty without one.
     """
 
     def __init__(
@@ -115,7 +123,8 @@ class Stopping:
         self._owed = owed
         self._doubtful: list[tuple[Ok, bool]] = []
         self.rounds = 0
-        self._negative: set[str] = set()
+        self.strange = ""
+        self._negative: Counter[str] = Counter()
         longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
         self._patience_s = (3.0 if move is not None else longest_s) + 2 * delay_s
         self._silent_from_s = now + self._patience_s
@@ -159,6 +168,8 @@ class Stopping:
         if self.last_port:
             return False  # after the stop port, the server may be unable to begin or end anything
         if not self._is_answer(reply):
+            if isinstance(reply, Fail):
+                self.strange = f"fail {reply.reason}".strip()
             return False
         self._silent_from_s = now + self._patience_s
         none = isinstance(reply, Fail) and reply.reason in (NO_MOTION, NOT_IN_MOTION)
@@ -175,8 +186,10 @@ class Stopping:
         if now < self._unsure_until_s:
             return False
         if none and isinstance(reply, Fail):
-            self._negative.add(reply.reason)
-        return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
+            self._negative[reply.reason] += 1
+        if self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion]):
+            return True
+        return self.rounds >= ROUNDS and self._negative[NO_MOTION] >= self.rounds + SURPLUS
 
     def doubt(self, reply: Ok, *, likely: bool = True) -> None:
         """Record a doubtful reply. It may answer the stop command, be late, or be a copy.

@@ -21,6 +21,13 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 UNCONTROLLED: Final = (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)
 LOST_REPEAT_S: Final = 1.0
+STRANGE_ROUNDS: Final = 6
+"""Number of stop commands after which the driver reports an unexpected reply to them."""
+STRANGE: Final = (
+    "the server answers a stop by '{}', which does not show that no motion is in progress;"
+    " the driver expects 'no motion in progress' (SRM) or 'no motion' (SM): check that the server"
+    " is a MART controller, and update it"
+)
 NAMES: Final = {
     Motion.REFERENCE: "RM",
     Motion.REVERSE: "B",
@@ -84,6 +91,8 @@ class Stops(StopReasons, ABC):
         if said:
             self.proof.stopped(now)
             self.commanded = STANDING
+            if stopping.strange and stopping.rounds == STRANGE_ROUNDS and not self.greeted:
+                self._once(STRANGE.format(stopping.strange))
             if not self.greeted or stopping.asks_name(now):
                 packets += self._greet(now)
         return packets

@@ -197,3 +197,43 @@ def test_a_command_that_the_server_does_not_know_is_named_as_the_reason(word: by
     said = [*bench.notices, bench.try_command(0.0, 0.4)]
     assert any("does not know the command" in each for each in said), said
     assert not any("obstacle" in each for each in said), said
+
+
+def translate(bench: MartBench, texts: dict[bytes, bytes]) -> None:
+    """Make the server of ``bench`` send other texts. ``texts``: its own text to the other one."""
+    advance = bench.robot.advance
+    bench.robot.advance = lambda: [  # type: ignore[method-assign]
+        (channel, texts.get(data, data)) for channel, data in advance()
+    ]
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_server_that_has_one_text_for_no_motion_is_driven(firmware: Firmware) -> None:
+    """The server answers SRM by "no motion", the text that other servers have for SM only.
+
+    The driver connects, drives, and stops.
+    """
+    bench = MartBench(firmware)
+    translate(bench, {b"fail no motion in progress": b"fail no motion"})
+    bench.ready()
+    assert bench.session.state == "nominal"
+    bench.command(0.3, 0.0, 2.0)
+    assert not bench.robot.stands
+    bench.server.receive(b"SRM", 0, None, bench.robot.board.now_s)
+    bench.command(0.0, 0.0, 2.0)
+    assert bench.robot.stands
+    assert not any("lost" in notice for notice in bench.notices)
+
+
+@pytest.mark.parametrize("text", ["fail command not supported", "fail"])
+def test_a_server_with_an_unknown_answer_to_a_stop_is_named(text: str) -> None:
+    """The server answers SRM by a text that shows nothing, so the driver stays connecting.
+
+    The log says what the server answers: this is not a fault of the cable.
+    """
+    bench = MartBench()
+    translate(bench, {b"fail no motion in progress": text.encode()})
+    bench.open()
+    bench.run(10.0)
+    assert bench.session.state == "connecting"
+    assert sum(f"a stop by '{text}'," in each for each in bench.notices) == 1
