@@ -108,7 +108,7 @@ class MartBoard(Board):
                 "Goal": pilot.goal_progress,
                 "Motor balance": pilot.motor_balance,
             },
-            trouble=pilot.refusal,
+            trouble=pilot.refusal or pilot.imu.trouble,
         )
 
     @property

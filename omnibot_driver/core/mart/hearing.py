@@ -68,6 +68,8 @@ class Hearing(Measuring):
         elif self.state is State.REVERSING and isinstance(reply, Ok) and reply.form is Form.NOTHING:
             self.loop.answered_again()
             self._predict_turn()
+        elif self.state is State.CHECKING and isinstance(reply, Ok) and reply.form is Form.NOTHING:
+            self.imu.came_early()
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply that comes after a stop command may belong to an earlier request.
@@ -200,6 +202,8 @@ class Hearing(Measuring):
         elif word.kind is Kind.CHECK:
             self.state = State.STILL
             self.imu.missed(now)
+            if why := self.imu.trouble:
+                self._once(why)
         elif word in (words.MCS, words.MSM):
             if self._switch_off.missed(word, disturbed=self.conversation.disturbed(now)):
                 self._once(NO_MCS)

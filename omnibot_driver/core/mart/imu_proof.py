@@ -28,6 +28,8 @@ PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 If a check takes longer, the network is assumed to have delayed request and reply equally. Half of
 the additional time is then the age of the result when it arrives.
 """
+EARLY: Final = 4
+"""After this number of checks in a row whose only reply came too early, the driver reports it."""
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
@@ -52,7 +54,8 @@ class ImuProof:
         self.dead = False
         self.transit_s = 0.0
         self.again_s = self._proved_s = -math.inf
-        self._fails = 0
+        self._fails = self._early = 0
+        self._came_early = False
 
     def fresh(self, now: float) -> bool:
         """Return whether the last successful check is recent enough for a motion to start."""
@@ -71,9 +74,25 @@ class ImuProof:
         """The request that checks the IMU."""
         return RESET.request() if self.word is RESET else CHECK.request(0)
 
+    def came_early(self) -> None:
+        """Record an ``ok`` that came before the server can have done the check in progress."""
+        self._came_early = True
+
     def missed(self, now: float) -> None:
         """Record that a check was not answered; the next check is due after REPEAT_S."""
         self.again_s = now + REPEAT_S
+        self._early = self._early + 1 if self._came_early else 0
+        self._came_early = False
+
+    @property
+    def trouble(self) -> str:
+        """Why no check succeeds although the server answers, with a remedy; empty if none fails."""
+        if self._early < EARLY:
+            return ""
+        return (
+            f"no motion starts: the server answers {self.request.data.decode()} in less than"
+            f" {self.word.least_s:g} s, too fast for a check of the IMU: update the server"
+        )
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
         """Evaluate the reply to a check; return False if the caller must evaluate it.
@@ -96,6 +115,7 @@ class ImuProof:
             self.again_s = now + (DEAD_REPEAT_S if self.dead else REPEAT_S)
         else:
             return False
+        self._early, self._came_early = 0, False
         return True
 
     def retries(self, now: float) -> bool:

@@ -9,7 +9,7 @@ import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
 
-from omnibot_driver.simulator.mart import Firmware
+from omnibot_driver.simulator.mart import Firmware, service_commands
 
 pytestmark = pytest.mark.slow
 
@@ -104,3 +104,20 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
     assert bench.robot.stands
     assert [notice for notice in bench.notices if "MPU6050 connection lost" in notice]
     assert not [notice for notice in bench.notices if "without a command" in notice]
+
+
+def test_a_check_of_the_imu_that_is_too_fast_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The server answers RST IMU faster than it can check the IMU, so no motion starts.
+
+    The driver says why, in its log and in the diagnostics, until a check succeeds.
+    """
+    bench = MartBench().ready()
+    monkeypatch.setattr(service_commands, "RESET_S", 0.02)
+    bench.command(0.3, 0.0, 6.0)
+    assert bench.server.chassis.way_m == 0.0
+    assert sum("answers RST IMU in less than" in each for each in bench.notices) == 1
+    assert "RST IMU" in bench.session.figures(bench.now).board.trouble
+    monkeypatch.undo()
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+    assert bench.session.figures(bench.now).board.trouble == ""
