@@ -100,6 +100,9 @@ class Half:
         """Whether the board sends the data stream that driving requires. A restart of the board
         resets this flag."""
         self._told: int | None = None
+        self._started = False
+        """Whether a board has sent its start message, but no heartbeat yet: which board it is, is
+        unknown."""
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
         self._at: dict[str, float] = {}
@@ -263,10 +266,17 @@ class Half:
             self.identity, self.role = identity, ROLES.get(identity)
         if self.heartbeat is None:
             self._next_at = -math.inf
+        if self._started and self.role is not None:
+            self._started = False
+            self._restart()
 
     def _read_comment(self, text: str) -> None:
         if "Starting main loop" in text:
-            self._restart()
+            if self.heartbeat is None:
+                self._started = True
+                self._next_at = -math.inf  # request the heartbeat at once
+            else:
+                self._restart()
         elif "CRC failed" in text:
             self.rejected += 1
         elif found := _UNHANDLED.search(text):

@@ -320,3 +320,23 @@ def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() ->
     bench.session.inbound.receive(b"# Starting main loop\n", bench.now, DRIVE)
     bench.run(3.0)
     assert any("drive board has restarted" in text for text in bench.notices)
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_a_board_that_restarts_at_the_port_of_the_other_is_named(half: str) -> None:
+    """Both boards are plugged in at each other's port, and one of them restarts there.
+
+    Its start message arrives before its first heartbeat. The driver reports the restart of this
+    board as soon as this heartbeat arrives, and no restart of the other board.
+    """
+    bench = nominal()
+    bench.close()
+    bench.robot._at_port = bench.robot._at_port[::-1]
+    restarted = bench.robot.drive if half == "drive" else bench.robot.front
+    restarted._restart(0.0)
+    bench.open()
+    bench.run_until(lambda: bench.board._ports.halves[1 - HALVES[half]].heartbeat is not None)
+    assert f"the {half} board has restarted; robot stopped" in bench.notices
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    assert sum("restarted" in text for text in bench.notices) == 1
