@@ -5,7 +5,6 @@
 Extra fields are ignored, because newer firmware adds fields. The module does not know checksums.
 """
 
-import math
 import re
 from collections.abc import Callable
 from typing import Final
@@ -77,11 +76,6 @@ def parse(text: str) -> Message | None:
     return None if parser is None else parser(fields)
 
 
-def is_known(keyword: str) -> bool:
-    """Return whether ``keyword`` can begin a valid line."""
-    return keyword in _PARSERS
-
-
 def decimals_of(field: str) -> int:
     """Return how many characters follow the decimal point; -1 if the field has no point."""
     _, point, after = field.partition(".")
@@ -100,7 +94,7 @@ def numbers(fields: list[str], *ranges: Range) -> list[float] | None:
         if not _NUMBER.fullmatch(field):
             return None
         number = float(field)
-        if not (math.isfinite(number) and least <= number <= most):
+        if not least <= number <= most:
             return None
         found.append(number)
     return found
