@@ -194,7 +194,7 @@ class Configuration:
 def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
     """Return the line that writes ``numbers`` to the board as the values of ``setting``."""
     words = " ".join(f"{number:.6g}" for number in numbers)
-    return f"{setting.command} {words}".encode("ascii")
+    return f"{setting.value} {words}".encode("ascii")
 
 
 def _near(

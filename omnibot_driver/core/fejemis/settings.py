@@ -14,30 +14,24 @@ AccelerationUnit = Literal["m/s^2", "g"]
 class Written(Enum):
     """Settings that the driver can write to a board.
 
-    Each value is the command that writes the setting, and the count of its numbers.
+    Each value is the command that writes the setting.
     """
 
-    WHEELS = "confw", 5
+    WHEELS = "confw"
     """Radii of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
-    STEERING = "confs", 2
+    STEERING = "confs"
     """Two lengths in m, for both boards: the track, and the distance from the axle to the steered
     wheel."""
-    FRONT_WHEEL = "fwoffset", 2
+    FRONT_WHEEL = "fwoffset"
     """Offset of the front wheel's angle in degrees, then 1 if the angle is inverted, else 0."""
-    INFRARED = "irc", 4
+    INFRARED = "irc"
     """Raw values of infrared sensor 1 at 13 cm and at 50 cm, then those of sensor 2."""
-    MAGNETOMETER = "magcal", 12
+    MAGNETOMETER = "magcal"
     """Three offsets of the magnetometer, then a 3 × 3 matrix, row by row."""
-    ACCELEROMETER = "acccal", 6
+    ACCELEROMETER = "acccal"
     """Three offsets of the accelerometer, then three scales."""
-    STEERING_GAINS = "cssteer", 0
+    STEERING_GAINS = "cssteer"
     """Parameters of the steering controller, as in ucontrolbase.cpp. Their count is not fixed."""
-
-    command: str
-    count: int
-
-    def __init__(self, command: str, count: int) -> None:
-        self.command, self.count = command, count
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -145,7 +145,7 @@ class Upkeep:
         """Advice on what the user should set or update; None if there is nothing to advise."""
         for configuration in self.configurations.values():
             if configuration.failed:
-                names = ", ".join(setting.command for setting in configuration.failed)
+                names = ", ".join(setting.value for setting in configuration.failed)
                 return (
                     f"the {configuration.role} board does not keep the values written with"
                     f" {names}; check these values and the board's firmware"

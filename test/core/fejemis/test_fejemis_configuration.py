@@ -29,7 +29,7 @@ def test_only_what_the_user_set_is_written() -> None:
     bench = nominal()
     bench.run(3.0)
     words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
-    assert not words & {setting.command for setting in Written}
+    assert not words & {setting.value for setting in Written}
     assert "setid" not in words
     own = bench.board.figures.own
     assert own["Drive conf"] == "0.0775 0.0775 19 68 0.4"
@@ -66,7 +66,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         assert bench.board.geometry.track_m == 0.41
         mark = bench.now
         bench.run(2.0)
-        written = {setting.command for setting in Written}
+        written = {setting.value for setting in Written}
         assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
         assert bench.board.advice is None
 
@@ -246,7 +246,7 @@ def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
         for count in (1, 2):
             for kept in itertools.combinations(text, len(text) - count):
                 word = "".join(kept).split(" ")[0]
-                assert not word.startswith((*(one.command for one in Written), "sv", "set")), text
+                assert not word.startswith((*(one.value for one in Written), "sv", "set")), text
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
