@@ -29,7 +29,6 @@ class DecoderStatistics:
     ``faults``: how many lines were damaged or of an unknown kind.
     """
 
-    lines: int = 0
     faults: int = 0
     discarded_bytes: int = 0
 
@@ -108,7 +107,6 @@ class FejemisDecoder:
             self.doubtful = self.contradicted = False
         if not isinstance(message, Comment) and not self._forms.admit(text, summed=right is True):
             return None
-        self.statistics.lines += 1
         return message
 
     def _learn(self, *, with_sum: bool) -> None:
