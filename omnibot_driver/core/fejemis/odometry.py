@@ -174,8 +174,6 @@ class PoseOdometry:
     def _doubt(self, pose: BoardPose, since_s: float) -> DisplacementReading | None:
         before, self._doubted = self._doubted, pose
         self.refused += 1
-        if self._pose is None:
-            return None
         if before is None:
             self._driven = self._driven_to(pose, since_s)
             return None
