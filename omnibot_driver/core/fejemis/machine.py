@@ -11,7 +11,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.errors import CommandRefused
-from omnibot_driver.core.fejemis.numerals import between, nearest
+from omnibot_driver.core.fejemis.numerals import between
 from omnibot_driver.core.fejemis.outbound import robust
 
 OFF: Final = (b"motv 0 0", b"brush 0")
@@ -165,7 +165,7 @@ def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """
     if not volts:
         return OFF[0], 0.0
-    seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)
+    seconds, time_text = between(0.0, max(LEAST_TIME_S, longest_s), negative=True)[-1]
     most, sign = abs(volts), "-" if volts < 0.0 else ""
     texts = [text for _, text in between(LEAST_PART * most, most, negative=volts < 0.0)]
     lines = (f"motv {sign}{text} {time_text}".encode("ascii") for text in reversed(texts))

@@ -40,16 +40,12 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     return numbers, [found[number] for number in numbers]
 
 
-def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """Return the safe number (``numerals``) nearest to a positive ``number``, with its text.
-
-    ``down``: whether the result must not exceed ``number``. If all safe numbers exceed ``number``,
-    the result is the smallest of them.
-    """
+def nearest(number: float, *, negative: bool) -> tuple[float, str]:
+    """Return the safe number (``numerals``) nearest to a positive ``number``, with its text."""
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
-    if at == len(numbers) or (at > 0 and (down or number - numbers[at - 1] < numbers[at] - number)):
-        at -= 1 if at == len(numbers) or numbers[at] != number else 0
+    if at == len(numbers) or (at > 0 and number - numbers[at - 1] < numbers[at] - number):
+        at -= 1
     return numbers[at], texts[at]
 
 
