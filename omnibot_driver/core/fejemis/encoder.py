@@ -117,7 +117,7 @@ class Encoder:
         _, steered = encoded
         waits = steered.part == 0.0  # until the wheel is near enough for a turn on the spot
         self.follower.aim(steered.angle_rad, ALIGNED_RAD if waits else FOLLOWS_RAD)
-        self.held = not steered.whole
+        self.held = steered.part != 1.0
         self._turning = abs(steered.angle_rad) >= ACROSS_RAD and steered.part > 0.0
         return steered.twist
 

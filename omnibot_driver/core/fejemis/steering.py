@@ -35,7 +35,6 @@ class Steered:
     * ``part``: factor, 0..1, for the drive board's speed and turn rate.
     * ``angle_rad``: the angle that the front wheel must reach.
     * ``twist``: the body's motion at the front wheel's current angle.
-    * ``whole``: whether ``part`` is 1.
     """
 
     speed_mps: float
@@ -43,7 +42,6 @@ class Steered:
     part: float
     angle_rad: float
     twist: BodyTwist
-    whole: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +61,14 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def scale(twist: BodyTwist, track_m: float) -> float:
-    """Return the factor for speed and turn rate in a motion line (``rc``); 1 for a stop.
+    """Return the factor for speed and turn rate in a motion line (``rc``).
 
     The factor gives the drive board's outer wheel the speed that the twist requires.
     """
     # The drive board drives its outer wheel at sqrt(v² + w²), and turns about a centre that follows
     # from the measured front angle. The factor makes the root equal to the speed that the outer
     # wheel needs.
-    root = math.hypot(twist.vx_mps, twist.yaw_rate_radps)
-    return outer_mps(twist, track_m) / root if root else 1.0
+    return outer_mps(twist, track_m) / math.hypot(twist.vx_mps, twist.yaw_rate_radps)
 
 
 def outer_mps(twist: BodyTwist, track_m: float) -> float:
@@ -82,7 +79,7 @@ def outer_mps(twist: BodyTwist, track_m: float) -> float:
 def steer(
     wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
 ) -> Steered:
-    """Return the command for both boards that gives the body the twist ``wanted``.
+    """Return the command for both boards that gives the body the motion ``wanted``, not a stop.
 
     ``angle_rad``: the front wheel's measured angle; None while unknown.
 
@@ -91,21 +88,13 @@ def steer(
     target_rad = geometry.kinematics.steering_rad(wanted)
     factor = scale(wanted, geometry.track_m)
     outer = outer_mps(wanted, geometry.track_m)
-    allowed = 0.0
+    part, twist = 0.0, AT_REST
     if angle_rad is not None:
         allowed = min(outer, _allowed(wanted, geometry, target_rad, angle_rad, turning=turning))
-    part = allowed / outer if outer else 1.0
-    twist = AT_REST
-    if angle_rad is not None and allowed:
-        twist = body_twist(math.copysign(allowed, wanted.vx_mps or 1.0), geometry, angle_rad)
-    return Steered(
-        factor * wanted.vx_mps,
-        factor * wanted.yaw_rate_radps,
-        part,
-        target_rad,
-        twist,
-        part == 1.0,
-    )
+        part = allowed / outer
+        if allowed:
+            twist = body_twist(math.copysign(allowed, wanted.vx_mps or 1.0), geometry, angle_rad)
+    return Steered(factor * wanted.vx_mps, factor * wanted.yaw_rate_radps, part, target_rad, twist)
 
 
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
