@@ -39,7 +39,6 @@ class Polls:
     def __init__(self, role: Role) -> None:
         self.told: dict[str, str] = {}
         self._role: Role = role
-        self._unknown: set[bytes] = set()
         self.begin()
 
     def begin(self) -> None:
@@ -53,12 +52,12 @@ class Polls:
         """Time in s at which to call ``due`` next."""
         return min(self._next_at, self._sonar_at) if self._role == "drive" else self._next_at
 
-    def unknown(self, words: Mapping[str, None]) -> None:
-        """Stop sending the requests in ``words``, because the firmware does not know them."""
-        self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
+    def due(self, now: float, *, sums: bool, unknown: Mapping[str, None]) -> list[bytes]:
+        """Return the lines to send now.
 
-    def due(self, now: float, *, sums: bool) -> list[bytes]:
-        """Return the lines to send now; ``sums``: whether lines to the board carry a checksum."""
+        * ``sums``: whether lines to the board carry a checksum.
+        * ``unknown``: lines that the firmware does not know. They are not sent.
+        """
         texts = []
         if self._role == "drive" and now >= self._sonar_at:
             self._sonar_at = now + SONAR_EVERY_S
@@ -67,7 +66,7 @@ class Polls:
             self._next_at = now + EVERY_S
             text = ASKED[self._role][self._turn % len(ASKED[self._role])]
             self._turn += 1
-            if text not in self._unknown and (sums or text not in WITH_SUMS):
+            if text.decode("ascii") not in unknown and (sums or text not in WITH_SUMS):
                 texts.append(text)
         return texts
 

@@ -120,10 +120,8 @@ class Upkeep:
     def _of_half(self, half: Half, now: float, *, stands: bool) -> list[bytes]:
         texts = half.due(now)
         if half.role is not None and half.ready:
-            polls = self.polls[half.role]
-            polls.unknown(half.unknown_words)
             texts += self.configurations[half.role].due(now, stands=stands)
-            texts += polls.due(now, sums=half.sums)
+            texts += self.polls[half.role].due(now, sums=half.sums, unknown=half.unknown_words)
         return texts
 
     @property

@@ -387,7 +387,7 @@ def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone(
     """
     for sums in (True, False):
         polls = Polls("front")
-        texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]
+        texts = [text for n in range(40) for text in polls.due(float(n), sums=sums, unknown={})]
         assert (b"svpi" in texts) is sums
         assert (b"svjti" in texts) is sums
         assert b"cvsteeri" in texts
