@@ -50,12 +50,11 @@ class Obedience:
             self.start_at = math.inf
 
     def latch(self, *, running: bool) -> None:
-        """Latch the driver's e-stop.
+        """Latch the driver's e-stop, which is not latched yet.
 
         ``running``: whether the drive board obeys motion commands at this moment.
         """
-        if not self.estopped:
-            self._resume = running
+        self._resume = running
         self.estopped = True
         self.start_at = math.inf
 
