@@ -16,10 +16,10 @@ from omnibot_driver.core.fejemis.readings import Job
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
+from omnibot_driver.core.fejemis.watch import NO_DATA
 
 STOPS_WITHIN_S: Final = 0.5
 """Time in s from Stop to the loading of a configuration. A moving robot stops in this time."""
-NO_DATA: Final = "no data from the boards; check their power and cables"
 
 
 class Robot(Protocol):

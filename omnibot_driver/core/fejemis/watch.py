@@ -31,7 +31,7 @@ UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
     " or check the USB hub"
 )
-SILENT: Final = "no data from the boards; check their power and cables"
+NO_DATA: Final = "no data from the boards; check their power and cables"
 SLACK_S: Final = 1e-6
 
 
@@ -161,7 +161,7 @@ class Watch:
             return trouble
         if (self.blind or self.unposed) and self._looked_at < self._unread_until:
             silent = self._looked_at - self._heard_at >= SILENT_S
-            return SILENT if silent and self._looked_at >= self._patient_until else UNREAD
+            return NO_DATA if silent and self._looked_at >= self._patient_until else UNREAD
         if self.blind:
             return "no angle of the front wheel for 60 ms; check the front board"
         if self.unposed:
