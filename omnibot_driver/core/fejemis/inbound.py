@@ -100,8 +100,7 @@ class Inbound:
             self.mode = Mode.PAUSED if self._is_stopped(now) else Mode.NOMINAL
 
     def _is_stopped(self, now: float) -> bool:
-        paused = self.mode is Mode.PAUSED
-        return self._ports.ready and self._obedience.stopped(now, was_paused=paused)
+        return self._obedience.stopped(now, was_paused=self.mode is Mode.PAUSED)
 
     def _hear(self, half: Half, message: Message, now: float) -> None:
         if isinstance(message, Heartbeat):
@@ -134,7 +133,7 @@ class Inbound:
         if half.role != "drive":
             return
         self._obedience.hear(message.state)
-        if self._is_stopped(now):
+        if self._ports.ready and self._is_stopped(now):
             was_paused, self.mode = self.mode is Mode.PAUSED, Mode.PAUSED
             self._upkeep.machine.off()
             self._translation.add(PausedReading(continues=was_paused), now)
