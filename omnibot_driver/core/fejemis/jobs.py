@@ -203,7 +203,7 @@ class Jobs:
                 begin, ask, _ = OFFSETS[job]
                 if self._before is None:
                     return {"drive": [ask]}
-                if self._said <= SAID and self._begun_at > now - AGAIN_S:
+                if self._begun_at > now - AGAIN_S:
                     return {"drive": [begin]}
                 return {"drive": [ask] if now - self._begun_at > CALIBRATION_S else []}
 
