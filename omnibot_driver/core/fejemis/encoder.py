@@ -10,8 +10,13 @@ from typing import Protocol
 from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo, Order, TurnWheels
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.follower import FOLLOWS_RAD, Follower
-from omnibot_driver.core.fejemis.motion_lines import LEAST_MPS, drive_line, front_line
-from omnibot_driver.core.fejemis.plain_lines import plain_drive_line, plain_front_line
+from omnibot_driver.core.fejemis.motion_lines import (
+    LEAST_MPS,
+    drive_line,
+    front_line,
+    plain_drive_line,
+    plain_front_line,
+)
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.steering import (
     ACROSS_RAD,

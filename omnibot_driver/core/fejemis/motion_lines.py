@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes ``rc`` lines in which the checksum detects the loss of any two characters.
+"""Writes motion lines (``rc``) in which damage is detected, or has a limited effect.
 
 Several lines command the same motion: the front board uses only the ratio of speed and turn rate,
-the drive board only the root of the sum of their squares.
+the drive board only the root of the sum of their squares. With a checksum, the line is one in which
+the checksum detects the loss of any two characters. Without a checksum, some losses, such as that
+of a decimal point, still give a wrong number until the next line.
 """
 
 import math
@@ -98,6 +100,31 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     return _best(signs, found)
 
 
+def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
+    """Return the front board's line for firmware without checksums.
+
+    It has few digits, because short lines are damaged less often.
+    """
+    return b"rc 2 %s %s" % (_short(speed_mps, 4), _short(math.degrees(turn_radps), 2))
+
+
+def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
+    """Return the drive board's line for firmware without checksums.
+
+    It has the outer wheel's speed with its sign, and a turn rate of 0. The board computes the turn
+    from the angle of the front wheel.
+    """
+    # The line has a source (``2``), a speed and a turn rate. The board uses only the root of the
+    # sum of squares. If the source or the space after it is lost, the 0 becomes the speed: the line
+    # is a stop. If the space before the 0 is lost, the speed is the same: it has a decimal point,
+    # so ``1. 0`` becomes ``1.0``, not ``10``.
+    rim_mps = math.hypot(speed_mps, turn_radps)
+    if rim_mps < LEAST_MPS:
+        return STOP
+    speed = f"{math.copysign(rim_mps, speed_mps or 1.0):.3f}".rstrip("0")
+    return b"rc 2 %s 0" % speed.encode("ascii")
+
+
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
     """Return the cheapest line whose checksum would reveal damage, or else the cheapest line.
 
@@ -118,3 +145,8 @@ def _line(signs: tuple[str, str], speed: str, turn: str) -> bytes:
         for sign, text in zip(signs, (speed, turn), strict=True)
     )
     return " ".join(("rc 2", *words)).encode("ascii")
+
+
+def _short(number: float, decimals: int) -> bytes:
+    text = f"{number:.{decimals}f}".rstrip("0").rstrip(".")
+    return (text if text.strip("-") else "0").encode("ascii")

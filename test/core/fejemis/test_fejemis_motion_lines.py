@@ -12,9 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnibot_driver.core.fejemis.machine import LEAST_VOLTS, MOST_VOLTS, lift_line
-from omnibot_driver.core.fejemis.motion_lines import STOP, drive_line, front_line
+from omnibot_driver.core.fejemis.motion_lines import (
+    STOP,
+    drive_line,
+    front_line,
+    plain_drive_line,
+    plain_front_line,
+)
 from omnibot_driver.core.fejemis.outbound import line, robust
-from omnibot_driver.core.fejemis.plain_lines import plain_drive_line, plain_front_line
 from omnibot_driver.core.fejemis.sums import sum_of
 
 FRONT_M = 0.42
