@@ -12,8 +12,7 @@ from functools import lru_cache
 from itertools import combinations
 from typing import Final
 
-from omnibot_driver.core.fejemis.outbound import robust
-from omnibot_driver.core.fejemis.sums import MODULUS
+from omnibot_driver.core.fejemis.sums import MODULUS, robust
 
 ROUNDED: Final = 5
 """Largest allowed rounding of an angle, in tenths of a degree."""

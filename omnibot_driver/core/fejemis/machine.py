@@ -12,7 +12,7 @@ from typing import Final
 
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.numerals import between
-from omnibot_driver.core.fejemis.outbound import robust
+from omnibot_driver.core.fejemis.sums import robust
 
 OFF: Final = (b"motv 0 0", b"brush 0")
 TIMES: Final = 3

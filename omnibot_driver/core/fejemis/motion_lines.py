@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Final
 
 from omnibot_driver.core.fejemis.numerals import beside, between, nearest
-from omnibot_driver.core.fejemis.outbound import robust
+from omnibot_driver.core.fejemis.sums import robust
 
 STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001

@@ -8,9 +8,9 @@ An unidentified board only gets heartbeat requests, and lines that stop or switc
 from dataclasses import replace
 from typing import Final
 
-from omnibot_driver.core.fejemis import outbound
 from omnibot_driver.core.fejemis.half import Half, Role
 from omnibot_driver.core.fejemis.settings import FejemisSettings
+from omnibot_driver.core.fejemis.sums import lines
 from omnibot_driver.core.fejemis.teensy_clock import TeensyClock
 from omnibot_driver.core.fejemis.traits import TRAITS
 from omnibot_driver.core.packets import NO_PACKETS, Packets
@@ -133,5 +133,5 @@ class Ports:
 
     def at(self, channel: int, *texts: bytes) -> Packets:
         """Return a packet with lines for the board at ``channel``; no packet without ``texts``."""
-        data = outbound.lines(*texts, sums=self.halves[channel].sums)
+        data = lines(*texts, sums=self.halves[channel].sums)
         return ((channel, data),) if data else NO_PACKETS

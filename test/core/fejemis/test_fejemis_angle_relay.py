@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from test_fejemis_motion_lines import motions, without
 
 from omnibot_driver.core.fejemis.angle_relay import ACROSS, AngleRelay, heard_instead
-from omnibot_driver.core.fejemis.outbound import line, robust
+from omnibot_driver.core.fejemis.sums import line, robust
 
 EVERY = [tenths / 10 for tenths in range(-900, 901)]
 BEHIND = line(b"rc 2 .299 28.6", sums=True)

@@ -19,8 +19,7 @@ from omnibot_driver.core.fejemis.motion_lines import (
     plain_drive_line,
     plain_front_line,
 )
-from omnibot_driver.core.fejemis.outbound import line, robust
-from omnibot_driver.core.fejemis.sums import sum_of
+from omnibot_driver.core.fejemis.sums import line, robust, sum_of
 
 FRONT_M = 0.42
 COMMANDS = [
