@@ -100,8 +100,8 @@ class Machine:
     def begin(self) -> None:
         """Switch brush and lift off, and send the colour again, because a board has restarted."""
         self.off()
-        self._led_left = TIMES if self.colour else 0
-        self._led_at = -math.inf if self.colour else math.inf
+        if self.colour is not None:
+            self._led_left, self._led_at = TIMES, -math.inf
 
     def off(self) -> None:
         """Switch brush and lift off."""
