@@ -43,7 +43,7 @@ from omnibot_driver.core.readings import (
 TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
-PERIOD_S: Final = 0.03
+SAMPLE_WITHIN_S: Final = 0.03
 """Age of the last IMU sample, in s, from which an orientation is discarded. Younger samples are
 published together with the orientation.
 """
@@ -167,7 +167,7 @@ class Translation:
         self.stamped.add(self._imu.reading(pair), stamp_s, pair.at)
 
     def _orient(self, message: Attitude, came_at: float, now: float) -> None:
-        if math.isnan(self._imu.rates[0]) or came_at - self._imu_at >= PERIOD_S:
+        if math.isnan(self._imu.rates[0]) or came_at - self._imu_at >= SAMPLE_WITHIN_S:
             return
         oriented = OrientedImuReading(
             quaternion(message.roll_rad, message.pitch_rad, message.yaw_rad),
