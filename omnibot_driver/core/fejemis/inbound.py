@@ -79,7 +79,8 @@ class Inbound:
         if half.decoder.changed:
             half.decoder.changed = False
             ended = "now sends checksums" if half.decoder.sums else "no longer sends checksums"
-            self._told.halt(f"the {half.role} board {ended}; robot stopped", now)
+            board = self._ports.role(channel)
+            self._told.halt(f"the {board} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
         """Check the timeouts and update the mode; ``driving``: whether a motion is commanded."""

@@ -148,11 +148,12 @@ class Upkeep:
                     f"the {configuration.role} board does not keep the values written with"
                     f" {names}; check these values and the board's firmware"
                 )
-        for half in self._ports.halves:
+        for channel, half in enumerate(self._ports.halves):
             if half.decoder.contradicted:
                 return (
                     f"the parameter `line_sums` is {self._settings.line_sums}, but the lines of"
-                    f" the {half.role} board show the opposite: set `line_sums` to auto"
+                    f" the {self._ports.role(channel)} board show the opposite: set `line_sums` to"
+                    " auto"
                 )
             if unknown := half.unknown_streams:
                 return (

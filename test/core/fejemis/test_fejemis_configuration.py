@@ -7,6 +7,7 @@ import itertools
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, Firmware, nominal
 
+from omnibot_driver.core.fejemis.board import FejemisBoard
 from omnibot_driver.core.fejemis.codec import parse
 from omnibot_driver.core.fejemis.configuration import Configuration
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
@@ -259,6 +260,17 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
     bench.run(4.0)
     assert bench.session.state == "connecting"
     assert any("show the opposite" in text for text in bench.notices)
+
+
+def test_a_board_that_is_not_known_yet_is_named_by_its_port() -> None:
+    """A line comes before the first heartbeat, and contradicts the user's setting for checksums.
+
+    The advice names the board that ``port`` is for.
+    """
+    board = FejemisBoard(FejemisSettings(line_sums="on"))
+    board.connect()
+    board.receive(b"pose 1.0 0.0 0.0 0.0\n", 1000.0, DRIVE)
+    assert "the lines of the drive board" in (board.advice or "")
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
