@@ -49,6 +49,14 @@ def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
         obedience.look(3.5, 0.01, ahead, still)
 
 
+def test_a_front_wheel_may_turn_before_the_robot_moves() -> None:
+    """A robot with a steered front wheel stands for 1.3 s, until the wheel has turned sideways."""
+    obedience = Obedience("cmd_vel", boards.load("fejemis").PARAMETERS.by_name)
+    still, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.5)
+    for tick in range(350):
+        obedience.look(tick / 100, 0.01, turning, still if tick < 130 else turning)
+
+
 def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
     """Return a console that reads these answers, and the buffer to which it writes its texts."""
     shown, left = io.StringIO(), list(answers)

@@ -28,8 +28,10 @@ of ``cmd_vel`` are in m/s, m/s and rad/s, those of ``wheel_cmd`` in rad/s.
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Time, in s, that replaces ``LOOK_S`` for a board that rarely measures its motion. Between two
-measurements, the odometry is only predicted."""
+"""Time, in s, that replaces ``LOOK_S`` for a board with one of the parameters ``SLOW``."""
+SLOW: Final = ("odom_rate", "front_wheel_offset")
+"""Parameters of boards that follow a command late: the board rarely measures its motion, or its
+front wheel must first turn to the new direction."""
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
@@ -116,7 +118,7 @@ class Obedience:
         ``parameters``: the driver's parameters, by name.
         """
         self._topic = topic
-        self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
+        self._look_s = SLOW_LOOK_S if any(name in parameters for name in SLOW) else LOOK_S
         self._has_scales = "linear_scale" in parameters
         self._began_s = math.nan
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
