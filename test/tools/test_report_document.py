@@ -43,6 +43,7 @@ def test_every_subject_has_a_row() -> None:
         ("Commands", f"{100 * following.TOLERANCE:g} %"),
         ("Commands", f"constant for {following.STEADY_S:g} s"),
         ("Commands", f"for {following.SUSTAINED_S:g} s"),
+        ("Commands", f"wheels: {following.SLOW_START_S:g} s"),
         ("Odometry", f"{travel.LEAP_M:g} m or {travel.LEAP_RAD:g} rad"),
         ("IMU", f"{100 * sensing.SLIGHT_ERROR:g} %"),
         ("IMU", f"{100 * ACCEL_TOLERANCE:g} %"),

@@ -203,6 +203,13 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
     assert "first at 12.0 s" in stands.text
 
 
+def test_a_front_wheel_may_turn_before_the_robot_moves(drive: Drive) -> None:
+    """A Fejemis stands for 2 s, because its front wheel first turns from one side to the other."""
+    rows = (drive.odom.stamp_s > 12.0) & (drive.odom.stamp_s < 14.0)
+    drive.odom.values[rows, 3:] = 0.0
+    assert not any("stood still" in finding.text for finding in judge(of_a_fejemis(drive)))
+
+
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
     """Commands are missing for a while. The report notes this, since it explains a standstill."""
     drive.cmd_vel.drop(10.0, 10.8)

@@ -33,6 +33,9 @@ Friction may prevent slower motions.
 STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
 SUSTAINED_S: Final = 1.0
+SLOW_START_S: Final = 3.0
+"""Time in s for which a robot with two driving wheels may stand still although it is commanded to
+move: its front wheel may have to turn first, or its motors may start slowly."""
 AFTER_STOP_S: Final = 1.5
 """Time in s within which the robot must come to rest after an e-stop, or after the last command has
 timed out."""
@@ -145,7 +148,8 @@ def judge(log: Log) -> Iterator[Finding]:
         return
     free = ~_stopped(log, times_s)
     stalls = _sustained(times_s, free & (told > TOLD) & (moved < STANDS * told))
-    yield from _stalled(stalls)
+    longest_s = SLOW_START_S if log.two_wheels else SUSTAINED_S
+    yield from _stalled([stall for stall in stalls if stall.length_s >= longest_s])
     for pair in found:
         usable = ~_stopped(log, pair.measured.stamp_s)
         usable &= ~log.within(stalls, pair.measured.stamp_s)
