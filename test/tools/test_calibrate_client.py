@@ -49,6 +49,17 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
     assert all(one.kind != "velocity" for one in list(rigged.port.board.commands)[before:])
 
 
+def test_two_drivers_are_not_taken_for_a_driver_of_another_version(robot: Robot) -> None:
+    """Of two drivers with the same name, one has another board and lacks a parameter.
+
+    The message says that there are two drivers.
+    """
+    twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
+    assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
+    with pytest.raises(ToolError, match="several drivers in this namespace"):
+        robot._get_parameters(["parameter_of_another_board"])
+
+
 def test_a_driver_of_another_version_is_told(
     rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

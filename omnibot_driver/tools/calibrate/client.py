@@ -105,6 +105,7 @@ class Client:
         answer = self._call(GetParameters, f"{self.driver}/get_parameters", request, REQUESTS)
         values = [parameter_value_to_python(value) for value in answer.values]
         if len(values) != len(names):
+            self._require_alone()  # the answer may be that of another board's driver
             raise ToolError(
                 f"{self.driver} and this tool have different versions; update the older one"
             )
