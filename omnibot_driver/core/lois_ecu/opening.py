@@ -172,7 +172,7 @@ class SettingsWriter:
         """Write all settings again, as soon as no motion is commanded.
 
         The caller has detected a wheel that does not start. Perhaps the board has lost all lines
-        that set the low-pass coefficient.
+        that set the low-pass coefficient, or it expects checksums although the driver sends none.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
@@ -254,15 +254,16 @@ class SettingsWriter:
 
         Two commands are exceptions:
 
-        * A terminal mode gets two lines while the settings are unconfirmed. The first line has a
-          checksum: a board that has just booted obeys only lines with a checksum. If no motion is
-          commanded, Stop follows, because the board may have ignored the Stops before.
+        * A terminal mode gets two lines while the settings are unconfirmed, and after ``repeat``.
+          The first line has a checksum: a board that has just booted obeys only lines with a
+          checksum. If no motion is commanded, Stop follows, because the board may have ignored the
+          Stops before.
         * Stop never has a checksum (see ``_begin_round``).
         """
         if command == outbound.STOP:
             return encode_command(command, with_sum=False)
         line = outbound.lines(command, with_sum=self.settings.with_sum)
-        if isinstance(command, SetTerminalMode) and not self.confirmed:
+        if isinstance(command, SetTerminalMode) and (self._repeated or not self.confirmed):
             stop = [] if self._points.driving else [outbound.STOP]
             line = _both_forms(command) + outbound.lines(*stop, with_sum=False)
         return line

@@ -77,6 +77,25 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
 
 
 @FIRMWARE
+def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firmware: str) -> None:
+    """A damaged line switches the board's checksums on, after its settings were confirmed.
+
+    The wheels do not start. At rest, the driver writes the mode in both forms. The next drive moves
+    the robot.
+
+    Bug: the driver wrote the mode only without a checksum, and the board ignored all lines.
+    """
+    bench = Bench(firmware, LoisEcuSettings(with_sum=False))
+    bench.run(5.0)
+    bench.board.receive(b":1100000000\n")
+    bench.drive_on(0.3, 5.0)
+    assert bench.board.standing
+    bench.run(5.0)
+    bench.drive_on(0.3, 3.0)
+    assert not bench.board.standing
+
+
+@FIRMWARE
 @pytest.mark.parametrize("with_sum", [True, False])
 @pytest.mark.parametrize("commands", [True, False])
 def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
