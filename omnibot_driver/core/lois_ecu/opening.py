@@ -154,7 +154,11 @@ class SettingsWriter:
             at_s = self._round_at_s
         else:
             return math.inf
-        if self._points.stopped_at_s < math.inf:  # a round may have waited until this Stop
+        return self.after_set_points(at_s)
+
+    def after_set_points(self, at_s: float) -> float:
+        """Return when to write a line that is due at ``at_s``: not directly after a set-point."""
+        if self._points.stopped_at_s < math.inf:  # the line may have waited until this Stop
             at_s = max(at_s, self._points.stopped_at_s)
         apart_s = self._points.said_at_s + AFTER_SET_POINT_S
         return max(at_s, min(apart_s, at_s + LONGEST_WAIT_S))

@@ -65,13 +65,14 @@ class Upkeep:
             self.writer.begin(now)
             self._recovered_at_s = now
         with_sum = self.writer.settings.with_sum
-        data = self.writer.due(now)
+        recovers = now >= self._recover_at
+        data = b"" if recovers else self.writer.due(now)  # a recovery begins all rounds anew
         data += self._change_mode(now, stands=stands)
         if (record := self.request.due(now)) is not None:
             data += outbound.lines(record, with_sum=with_sum)
         if self._points.clears(now):
             data += outbound.lines(outbound.EMERGENCY_STOP, with_sum=with_sum)
-        if now >= self._recover_at:
+        if recovers:
             self._recovered_at_s = now
             data += self.writer.recovery()
             self.writer.begin(now)
@@ -111,10 +112,11 @@ class Upkeep:
         if self.change.sensor_wanted or self.change.terminal or self._points.driving:
             return math.inf
         silent_since_s = self._recovered_at_s if self.writer.ignored else self.heard_at_s
-        return min(
+        due_at_s = min(
             max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S,
             max(self.writer.unanswered_since_s, self._recovered_at_s) + UNANSWERED_S,
         )
+        return self.writer.after_set_points(due_at_s)
 
 
 def _written(settings: LoisEcuSettings) -> tuple[object, ...]:

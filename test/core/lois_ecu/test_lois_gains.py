@@ -17,6 +17,7 @@ from omnibot_driver.core.lois_ecu.opening import ROUNDS, SettingsWriter
 from omnibot_driver.core.lois_ecu.outbound import STOP
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.upkeep import Upkeep
 
 OTHER_STOP = b":0100000000\n"
 """Stop without a checksum, which a board that verifies checksums ignores."""
@@ -154,6 +155,27 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
     for count in range(1, 11):
         points.wrote(encode_command(STOP), now + 0.05 * count)
         assert bool(writer.due(now + 0.05 * count)) == (count == 10)
+
+
+@pytest.mark.parametrize("with_sum", [True, False])
+def test_a_recovery_that_waited_for_a_stop_follows_it_after_a_pause(with_sum: bool) -> None:
+    """No date has arrived before the end of a long drive, so the driver restores the board's mode.
+
+    It does so 15 ms after the Stop, and writes no setting together with the mode.
+
+    Bug: the mode followed the Stop at once.
+    """
+    settings = LoisEcuSettings(with_sum=with_sum)
+    points = SetPoints(settings)
+    upkeep = Upkeep(settings, points)
+    points.wrote(encode_command(SetRpm(20, 20), with_sum=with_sum), 0.0)
+    for count in range(600):
+        upkeep.due(0.01 * count, stands=False)
+    upkeep.writer.repeat(6.0)
+    points.wrote(encode_command(STOP, with_sum=with_sum), 6.0)
+    assert upkeep.wake_at == pytest.approx(6.015)
+    assert not upkeep.due(6.0, stands=False)
+    assert upkeep.due(6.016, stands=False) == upkeep.writer.recovery()
 
 
 def test_a_stop_in_the_other_form_is_written_alone() -> None:
