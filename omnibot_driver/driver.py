@@ -18,6 +18,7 @@ from typing import Final
 
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.output import UnblockedOutput, fill_gaps
+from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 5.0
@@ -132,13 +133,14 @@ def _main(ending: Ending, args: list[str]) -> int:
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
     from rclpy.exceptions import NameValidationException, ParameterException
     from rclpy.signals import SignalHandlerOptions
-    from rclpy.utilities import get_rmw_implementation_identifier, remove_ros_args
+    from rclpy.utilities import get_rmw_implementation_identifier
 
     domain = os.environ.get("ROS_DOMAIN_ID", "")
     if get_rmw_implementation_identifier().startswith("rmw_fastrtps") and too_large(domain):
         return _refuse(f"ROS_DOMAIN_ID is {domain}; Fast DDS allows at most {LARGEST_DOMAIN}")
     try:
-        if unknown := remove_ros_args(args)[1:]:
+        # ROS itself would take ``port:=/dev/x`` for a topic's new name, and ignore it.
+        if unknown := split_ros_arguments(args[1:])[0]:
             return _refuse(f"unknown argument {' '.join(unknown)}; {USAGE}")
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
         rclpy.get_default_context().on_shutdown(ending.begin)

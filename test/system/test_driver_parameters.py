@@ -81,9 +81,15 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
 
 
 @pytest.mark.parametrize(
-    "words", [["port:=sim://"], ["gyro_bias:=[0.1,0.0,0.0]", "axis_signs:=[1,-1,-1]"]]
+    ("before", "words"),
+    [
+        ([], ["port:=sim://"]),
+        (["--ros-args"], ["port:=sim://"]),
+        ([], ["port:=/dev/ttyUSB1"]),  # ROS would take it for a topic's new name
+        ([], ["gyro_bias:=[0.1,0.0,0.0]", "axis_signs:=[1,-1,-1]"]),
+        (["--ros-args"], ["gyro_bias:=[0.1,0.0,0.0]", "axis_signs:=[1,-1,-1]"]),
+    ],
 )
-@pytest.mark.parametrize("before", [[], ["--ros-args"]])
 def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
     """The user forgets ``-p`` before a parameter. The message shows how to write it."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
