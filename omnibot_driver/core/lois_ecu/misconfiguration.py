@@ -21,9 +21,9 @@ GAINS: Final = (
 """Gains of the speed controllers. The board does not report their values."""
 OWN_GAINS: Final = (
     "the speed controllers run with the board's own {}. With the gains of the public firmware a"
-    " wheel oscillates, so the robot does not hold its course. After 5 m, odometry is wrong by"
-    " 0.04 m on average, by at most 0.16 m in nearly all drives, and by 2.2 m in one of 150. Run"
-    " `calibrate step`, or set these parameters"
+    " wheel oscillates, so the robot does not hold its course. Even if the wheels have the"
+    " configured size, odometry after 5 m is wrong by 0.04 m on average, by at most 0.16 m in"
+    " nearly all drives, and by 2.2 m in one of 150. Run `calibrate step`, or set these parameters"
 )
 """Advice if the user has not set all gains; the braces stand for the names of the missing gains.
 The errors were measured in 150 forward drives with a build of the public firmware.
