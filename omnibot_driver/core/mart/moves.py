@@ -219,7 +219,7 @@ class Moves(Asking):
         ours, usual = self._settings, MartSettings()
         slowness = usual.speed_per_unit / ours.speed_per_unit
         if move.word in (words.MCR, words.MCL):
-            slowness *= ours.track_m / usual.track_m
+            slowness *= abs(ours.heading_scale) * ours.track_m / usual.track_m
         return Done(
             move,
             self.odometry.moved_m,

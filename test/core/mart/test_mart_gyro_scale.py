@@ -19,12 +19,12 @@ PART = 0.95
 """The part of each turn that the gyro measures."""
 
 
-def bench_with_poor_gyro(firmware: Firmware) -> MartBench:
-    bench = MartBench(firmware, settings=MartSettings(heading_scale=1 / PART))
+def bench_with_poor_gyro(firmware: Firmware, part: float = PART) -> MartBench:
+    bench = MartBench(firmware, settings=MartSettings(heading_scale=1 / part))
     imu = bench.server.imu
     sample = imu.sample
     imu.sample = lambda rate_dps, now, *, integrates: sample(  # type: ignore[method-assign]
-        PART * rate_dps, now, integrates=integrates
+        part * rate_dps, now, integrates=integrates
     )
     return bench.ready()
 
@@ -54,6 +54,20 @@ def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -
     turns = [said for said in bench.said() if said.startswith(b"MCL")]
     assert len(turns) == 1
     assert bench.odometry[-1].pose.yaw_rad - here.yaw_rad == pytest.approx(2.79, abs=0.1)
+
+
+def test_a_gyro_that_measures_half_of_each_turn_makes_no_turn_seem_late() -> None:
+    """A controlled turn lasts as long as the robot needs for the true angle, not for the requested.
+
+    Bug: each turn to a goal seemed to last long enough for two turns, so the heading was then
+    uncertain by more than 2 rad.
+    """
+    bench = bench_with_poor_gyro("firmware", 0.5)
+    here = bench.odometry[-1].pose
+    bench.go_to(here.x_m, here.y_m, here.yaw_rad + 2.6)
+    bench.run(20.0)
+    assert bench.odometry[-1].pose.yaw_rad - here.yaw_rad == pytest.approx(2.6, abs=0.1)
+    assert math.sqrt(bench.odometry[-1].covariance.yaw_yaw) < 0.1
 
 
 def test_a_new_scale_during_a_curve_is_not_a_turn() -> None:
