@@ -23,6 +23,13 @@ INITIAL_VARIANCE: Final = 1e-6
 """Initial variances of (1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
 UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
 """Variance of a direction of which nothing is known, in rad²."""
+ASTRAY, ASTRAY_RAD2 = 0.7, 0.1
+"""Position errors that an uncertain heading causes, beyond those that are linear in its error.
+
+There are two such errors: one along the motion, and one across it. The standard deviation of each
+error is a fraction of the driven distance. This fraction is ``ASTRAY`` times the variance of the
+heading, but at most 1. Below a variance of ``ASTRAY_RAD2``, in rad², the fraction is 0.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,6 +146,8 @@ class Uncertainty:
         self.gap = NOTHING
         self._halt = NOTHING
         self._walk = Covariance()
+        self._astray_m = (0.0, 0.0)
+        """Sum of the displacements in the odometry frame, each times its fraction (``ASTRAY``)."""
         self._levers: list[tuple[float, float, float]] = []
         """For each wheel: the error of the pose (m, m, rad) if the relative error of the wheel's
         size is 1."""
@@ -174,6 +183,10 @@ class Uncertainty:
             errors.append((drift * abs(rim_m), x_m, y_m, part.yaw_rad))
         self._levers = levers
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
+        if self._walk.yaw_yaw > ASTRAY_RAD2:
+            astray = min(1.0, ASTRAY * self._walk.yaw_yaw)
+            astray_x_m, astray_y_m = self._astray_m
+            self._astray_m = astray_x_m + astray * dx_m, astray_y_m + astray * dy_m
         if self.gap is not NOTHING:
             self.gap = self.gap.carried(dx_m, dy_m)
         if self._halt is not NOTHING:
@@ -202,9 +215,11 @@ class Uncertainty:
         the old frame shows that the board has not restarted, and how the robot has moved. Unlike
         ``gap``, this uncertainty does not increase the tolerance for poses.
 
-        ``way_m``, ``turn_rad``: mean distance and angle in which the robot came to rest.
+        ``way_m``, ``turn_rad``: mean distance and angle in which the robot came to rest. A large
+        angle makes the heading unknown, and no more.
         """
-        self._halt += Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
+        variance = min(turn_rad * turn_rad, UNKNOWN_YAW_VARIANCE)
+        self._halt += Covariance.diagonal(way_m * way_m, variance)
 
     def settle(self) -> None:
         """Remove the uncertainty of all gaps, because the motion in them is known now."""
@@ -236,6 +251,9 @@ class Uncertainty:
         known = self._walk if self.gap is NOTHING else self._walk + self.gap
         if self._halt is not NOTHING:
             known += self._halt
+        x_m, y_m = self._astray_m
+        if x_m or y_m:
+            known = known.with_errors([(1.0, x_m, y_m, 0.0), (1.0, -y_m, x_m, 0.0)])
         return known.with_errors(
             (*((scale, *lever) for lever in levers), (slip, *alike), (1.0, *wrong))
         )

@@ -183,6 +183,25 @@ def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_
     assert math.sqrt(covariance.yaw_yaw) > 0.04 / PERIOD_S * 2.8 / 2
 
 
+def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> None:
+    """A board restarts after 40 s without data, in which the robot may have turned at 1 rad/s.
+
+    Then it drives 2 m. Odom shows this drive along x, but its direction is unknown. So the position
+    becomes uncertain by 1 to 5 m in x and in y.
+
+    Bug: y became uncertain by 40 m.
+    """
+    odometry = Odometry(SETTINGS)
+    attach(odometry, PoseReading(0.0, 0.0, 0.0))
+    odometry.displace(body(0.0, 0.0, PERIOD_S), 1.0)
+    nothing = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True, up_s=0.0)
+    before = (odometry.displace(nothing, 41.0), odometry.settle(PoseReading(0.0, 0.0, 0.0)))[0][-1]
+    for _ in range(100):
+        after = odometry.displace(body(0.02, 0.0), 41.0)[-1]
+    assert 1.0 < math.sqrt(after.covariance.xx - before.covariance.xx) < 5.0
+    assert 1.0 < math.sqrt(after.covariance.yy - before.covariance.yy) < 5.0
+
+
 def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> None:
     """After a reset of the odometry, a loss that an earlier pose showed adds no motion."""
     odometry, trip = Odometry(SETTINGS), Trip()
