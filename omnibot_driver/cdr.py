@@ -22,7 +22,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.imu.bias_correction import ImuEstimate
-from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.covariance import UNKNOWN_YAW_VARIANCE, Covariance
 from omnibot_driver.core.odometry.estimate import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels
 
@@ -77,7 +77,9 @@ class Serializer:
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
         """Return the CDR bytes of an ``odom`` message with this estimate and stamp."""
-        pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance.of_direction
+        pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance
+        if noise.yaw_yaw > UNKNOWN_YAW_VARIANCE:  # else the call would change nothing
+            noise = noise.of_direction
         half_rad = pose.yaw_rad / 2
         moving, twist_noise = AT_REST, messages.TWIST_NOT_KNOWN
         if twist is not None:
