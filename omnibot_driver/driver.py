@@ -18,7 +18,7 @@ from typing import Final
 
 from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.output import UnblockedOutput, fill_gaps
-from omnibot_driver.tools.ros_arguments import split_ros_arguments
+from omnibot_driver.ros_arguments import split_ros_arguments
 
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 5.0

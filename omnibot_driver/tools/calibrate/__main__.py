@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Final
 
+from omnibot_driver.ros_arguments import split_ros_arguments
 from omnibot_driver.tools.calibrate.interruption import Interrupted, Interruption
 from omnibot_driver.tools.needs import ToolError, need
 from omnibot_driver.tools.printing import replace_unprintable
-from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 

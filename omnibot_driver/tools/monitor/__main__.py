@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
+from omnibot_driver.ros_arguments import split_ros_arguments
 from omnibot_driver.tools.drivers import discovery_advice
 from omnibot_driver.tools.monitor import text
 from omnibot_driver.tools.monitor.model import View
@@ -17,7 +18,6 @@ from omnibot_driver.tools.monitor.screen import has_screen
 from omnibot_driver.tools.monitor.teleop import DeadMan
 from omnibot_driver.tools.needs import ToolError, need
 from omnibot_driver.tools.printing import discard_output, printing, replace_unprintable
-from omnibot_driver.tools.ros_arguments import split_ros_arguments
 
 if TYPE_CHECKING:
     from omnibot_driver.tools.monitor.feed import Feed

@@ -2,7 +2,7 @@
 
 """Test that a command line is split into ROS arguments and the tool's own arguments."""
 
-from omnibot_driver.tools.ros_arguments import split_ros_arguments
+from omnibot_driver.ros_arguments import split_ros_arguments
 
 
 def test_ros_arguments_are_told_from_ours() -> None:
