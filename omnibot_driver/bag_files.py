@@ -49,20 +49,30 @@ def open_bag(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
 def messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """Yield the messages up to the first error in the bag; add this error to ``troubles``."""
+    """Yield the messages up to the first error in the bag; add this error to ``troubles``.
+
+    rosbags does not report a damaged part of an mcap file, but skips it. So this function also adds
+    a text if fewer messages were read than the bag's index has.
+    """
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return
-    storage = reader.storage
+    storage, count = reader.storage, 0
     try:
         if isinstance(storage, McapReader) and not storage.chunks:
             # If the mcap file has no index, ``messages`` requires ascending times, which a bag does
             # not guarantee.
-            yield from storage.messages_scan(wanted)
+            found = storage.messages_scan(wanted)
         else:
-            yield from reader.messages(wanted)
+            found = reader.messages(wanted)
+        for message in found:
+            count += 1
+            yield message
     except Exception as error:  # a damaged file may cause any error in the library
         troubles.append(f"{reader.path} cannot be read to its end: {in_a_line(error)}")
+        return
+    if count < (total := sum(item.msgcount for item in wanted)):
+        troubles.append(f"{reader.path} is damaged: only {count} of {total} messages can be read")
 
 
 def in_a_line(error: Exception) -> str:

@@ -119,7 +119,8 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         (home,) = found
         return tuple(home + name for name in names)
     if not raw:
-        raise _refusal(url, f"the bag has no topic {RAW_NAME[1:]}; record with `publish_raw: true`")
+        advice = "; ".join(["record with `publish_raw: true`", *troubles])
+        raise _refusal(url, f"the bag has no topic {RAW_NAME[1:]}; {advice}")
     if not found and (not wanted or wanted in raw):
         missing = " or ".join(f"{RAW_NAME[1:]}{name}" for name in names)
         received = [topic for topic in raw if RAW_NAME in topic] or raw

@@ -29,6 +29,8 @@ CHUNKS = [
     (1_790_000_000_000_000_001, b"\xff\xfa\x00"),
     (1_790_000_002_000_000_000, b"\n"),
 ]
+MESSAGE = 0x05
+"""Kind of an mcap record that contains a message."""
 PACKETS = [(at_ns, (0, data)) for at_ns, data in CHUNKS]
 
 
@@ -223,6 +225,36 @@ def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
     with pytest.raises(LinkError, match=r"any further: .*the file bag\.mcap is incomplete"):
         next(chunks)
     assert file.read_bytes() == content[:end] + b"\x05\x40"
+
+
+def test_a_bag_that_breaks_off_before_its_first_message_says_so(tmp_path: Path) -> None:
+    """The bag of a killed recorder has no complete message. The message says that it is incomplete.
+
+    The bag may have been recorded with the raw bytes, so this advice alone would mislead.
+    """
+    file = bag(tmp_path / "bag", RX) / "bag.mcap"
+    file.write_bytes(file.read_bytes()[:60])
+    (tmp_path / "bag/metadata.yaml").unlink()
+    with pytest.raises(ParameterError, match=r"no topic raw_rx.*bag\.mcap is incomplete"):
+        open_recording(f"replay://{tmp_path / 'bag'}")
+
+
+@pytest.mark.parametrize("given", ["file", "folder"])
+def test_a_damaged_part_within_a_bag_is_reported(tmp_path: Path, given: str) -> None:
+    """A part of a finished mcap file is damaged, and the library skips what follows in its chunk.
+
+    The replay has the packets before the damage, and says at its end how many are missing.
+    """
+    path = bag(tmp_path / "bag", RX)
+    file = path / "bag.mcap"
+    content = file.read_bytes()
+    record = content.index(CHUNKS[1][0].to_bytes(8, "little")) - 15
+    assert content[record] == MESSAGE
+    file.write_bytes(content[:record] + b"\x55" * 9 + content[record + 9 :])
+    chunks = open_recording(f"replay://{file if given == 'file' else path}").chunks()
+    assert next(chunks) == PACKETS[0]
+    with pytest.raises(LinkError, match=r"is damaged: only 1 of 3 messages can be read"):
+        next(chunks)
 
 
 def test_only_its_own_urls_are_taken() -> None:
