@@ -6,6 +6,7 @@ import contextlib
 import os
 import select
 import threading
+import time
 import tty
 from collections.abc import Iterator
 from functools import partial
@@ -20,6 +21,8 @@ from omnibot_driver.core.packets import Packet
 from omnibot_driver.transports import LinesChanged
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Opener, Several
+
+PATIENCE_S = 10.0
 
 
 class Ends:
@@ -98,8 +101,10 @@ def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) 
 
 
 def read_on(lines: Several) -> NoReturn:
-    while True:
+    until = time.monotonic() + PATIENCE_S
+    while time.monotonic() < until:
         lines.read()
+    pytest.fail(f"the lines could be read for {PATIENCE_S:g} s, without an exception")
 
 
 def changed(lines: Several) -> dict[int, str]:
