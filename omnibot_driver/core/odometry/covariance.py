@@ -23,12 +23,12 @@ INITIAL_VARIANCE: Final = 1e-6
 """Initial variances of (1 mm)² and (1 mrad)²: about the resolution of the board's own poses."""
 UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
 """Variance of a direction of which nothing is known, in rad²."""
-ASTRAY, ASTRAY_RAD2 = 0.7, 0.1
-"""Position errors that an uncertain heading causes, beyond those that are linear in its error.
+ASTRAY: Final = 0.7
+"""Factor for the position errors that ``Astray`` adds."""
+ASTRAY_RAD2: Final = 0.03
+"""Smallest variance of the heading, in rad², with which odometry adds the errors of ``Astray``.
 
-There are two such errors: one along the motion, and one across it. The standard deviation of each
-error is a fraction of the driven distance. This fraction is ``ASTRAY`` times the variance of the
-heading, but at most 1. Below a variance of ``ASTRAY_RAD2``, in rad², the fraction is 0.
+Below it, the slip of the wheels causes larger errors.
 """
 
 
@@ -138,6 +138,37 @@ class Covariance:
 NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 
 
+class Astray:
+    """Position errors that an uncertain heading causes, beyond those that are linear in its error.
+
+    There are two such errors: one along the motion, and one across it. The standard deviation of
+    each error is a fraction of the driven distance. This fraction is ``ASTRAY`` times the variance
+    of the heading, but at most 1. So a way back cancels the errors of the way out, if the heading
+    has not become less certain in between.
+
+    ``m2``: variance of x and of y, in m².
+    """
+
+    def __init__(self) -> None:
+        self.m2 = 0.0
+        self._along_m = (0.0, 0.0)
+        """Covariance of the position and the present error of the direction, if this error is a
+        random number with variance 1."""
+        self._rad2 = 0.0
+
+    def move(self, dx_m: float, dy_m: float, rad2: float) -> None:
+        """Add the errors of a displacement in the odometry frame.
+
+        ``rad2``: variance of the heading. If it has doubled, half of its error is new.
+        """
+        kept = min(1.0, self._rad2 / rad2)
+        part = min(1.0, ASTRAY * rad2)
+        x_m, y_m = kept * self._along_m[0], kept * self._along_m[1]
+        dx_m, dy_m = part * dx_m, part * dy_m
+        self.m2 += dx_m * (dx_m + 2 * x_m) + dy_m * (dy_m + 2 * y_m)
+        self._along_m, self._rad2 = (x_m + dx_m, y_m + dy_m), rad2
+
+
 class Uncertainty:
     """The uncertainty of one odometry. ``noise`` may be replaced at any time."""
 
@@ -146,8 +177,7 @@ class Uncertainty:
         self.gap = NOTHING
         self._halt = NOTHING
         self._walk = Covariance()
-        self._astray_m = (0.0, 0.0)
-        """Sum of the displacements in the odometry frame, each times its fraction (``ASTRAY``)."""
+        self._astray = Astray()
         self._levers: list[tuple[float, float, float]] = []
         """For each wheel: the error of the pose (m, m, rad) if the relative error of the wheel's
         size is 1."""
@@ -184,9 +214,7 @@ class Uncertainty:
         self._levers = levers
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
         if self._walk.yaw_yaw > ASTRAY_RAD2:
-            astray = min(1.0, ASTRAY * self._walk.yaw_yaw)
-            astray_x_m, astray_y_m = self._astray_m
-            self._astray_m = astray_x_m + astray * dx_m, astray_y_m + astray * dy_m
+            self._astray.move(dx_m, dy_m, self._walk.yaw_yaw)
         if self.gap is not NOTHING:
             self.gap = self.gap.carried(dx_m, dy_m)
         if self._halt is not NOTHING:
@@ -234,8 +262,11 @@ class Uncertainty:
         self._halt = NOTHING
 
     def give_up(self) -> None:
-        """Make the uncertainty of all gaps permanent, because the motion in them stays unknown."""
-        self._walk += self.gap + self._halt
+        """Make the uncertainty of all gaps permanent, because the motion in them stays unknown.
+
+        A large turn in a gap makes the heading unknown, and no more.
+        """
+        self._walk += (self.gap + self._halt).of_direction
         self.gap = self._halt = NOTHING
 
     def total(self, open_error: Pose) -> Covariance:
@@ -251,9 +282,8 @@ class Uncertainty:
         known = self._walk if self.gap is NOTHING else self._walk + self.gap
         if self._halt is not NOTHING:
             known += self._halt
-        x_m, y_m = self._astray_m
-        if x_m or y_m:
-            known = known.with_errors([(1.0, x_m, y_m, 0.0), (1.0, -y_m, x_m, 0.0)])
+        if self._astray.m2:
+            known += Covariance.diagonal(self._astray.m2, 0.0)
         return known.with_errors(
             (*((scale, *lever) for lever in levers), (slip, *alike), (1.0, *wrong))
         )

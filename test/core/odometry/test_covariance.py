@@ -21,7 +21,7 @@ from synthetic_board import (
 
 from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise
+from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 from omnibot_driver.core.odometry.estimate import OdometryEstimate, OdometrySettings
 from omnibot_driver.core.odometry.estimator import Odometry
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
@@ -52,6 +52,45 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
         assert now.yaw_yaw >= before.yaw_yaw
         assert minors(now)[2] >= minors(before)[2] * (1 - 1e-6)
         before = now
+
+
+@given(st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3, st.sampled_from("mmmmgghsbu"))))
+def test_the_covariance_is_positive_definite_after_gaps_and_restarts(
+    steps: list[tuple[float, float, float, str]],
+) -> None:
+    """The robot moves, with gaps and restarts. Their uncertainty is removed, replaced or kept."""
+    uncertainty, yaw_rad = Uncertainty(OdometryNoise()), 0.0
+    for x, y, turn_rad, event in steps:
+        if event == "m":
+            uncertainty.move(yaw_rad, Pose(x, y, turn_rad))
+            yaw_rad += turn_rad
+        elif event == "g":
+            uncertainty.miss(abs(x), 0.5, 5.0)
+        elif event == "h":
+            uncertainty.halt(abs(x), 2 * turn_rad)
+        elif event == "b":
+            uncertainty.bound(x, turn_rad)
+        else:
+            (uncertainty.settle if event == "s" else uncertainty.give_up)()
+        covariance = uncertainty.total(Pose())
+        assert min(minors(covariance)) > 0.0
+        assert min(minors(covariance.of_direction)) > 0.0
+
+
+def test_a_robot_that_turned_unheard_has_an_unknown_heading_and_no_more() -> None:
+    """The robot may have turned by 50 rad in a gap that no pose explains. Then it drives 2 m.
+
+    This drive ends within 2 m of its start, so its direction adds at most a few metres.
+
+    Bug: the position across the drive was uncertain by 100 m.
+    """
+    uncertainty = Uncertainty(OdometryNoise())
+    uncertainty.miss(10.0, 0.0, 5.0)
+    uncertainty.give_up()
+    uncertainty.move(0.0, Pose(2.0))
+    covariance = uncertainty.total(Pose())
+    assert 1.0 < math.sqrt(covariance.xx) < 5.0
+    assert 1.0 < math.sqrt(covariance.yy) < 5.0
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:

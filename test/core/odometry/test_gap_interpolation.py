@@ -202,6 +202,27 @@ def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> No
     assert 1.0 < math.sqrt(after.covariance.yy - before.covariance.yy) < 5.0
 
 
+def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
+    """The board restarts, so that its direction is unknown, and the robot drives 2 m.
+
+    The board restarts again, and odom shows a drive back to the start. The true directions differ,
+    so x is uncertain by more than 1 m.
+
+    Bug: the errors of both drives cancelled each other, and x was uncertain by 0.1 m.
+    """
+    odometry = Odometry(SETTINGS)
+    attach(odometry, PoseReading(0.0, 0.0, 0.0))
+    nothing = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True, up_s=0.0)
+    for now, step in ((41.0, 0.02), (82.0, -0.02)):
+        odometry.displace(body(0.0, 0.0, PERIOD_S), now - 40.0)
+        odometry.displace(nothing, now)
+        odometry.settle(PoseReading(0.0, 0.0, 0.0))
+        for _ in range(100):
+            after = odometry.displace(body(step, 0.0), now)[-1]
+    assert after.pose.x_m == pytest.approx(0.0, abs=0.02)
+    assert 1.0 < math.sqrt(after.covariance.xx) < 5.0
+
+
 def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> None:
     """After a reset of the odometry, a loss that an earlier pose showed adds no motion."""
     odometry, trip = Odometry(SETTINGS), Trip()
