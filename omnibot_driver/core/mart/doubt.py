@@ -10,7 +10,7 @@ import math
 from typing import Final
 
 from omnibot_driver.core.mart.settings import MartSettings
-from omnibot_driver.core.odometry.covariance import Covariance
+from omnibot_driver.core.odometry.covariance import Astray, Covariance
 
 WAY_STDDEV: Final = 0.004
 """Standard deviation in m of a distance of 1 m.
@@ -49,13 +49,6 @@ BEND_WALK: Final = 0.5
 Both errors are standard deviations. The constant error has the same sign in all intervals between
 two encoder counts; the random error is independent in each interval.
 """
-ASTRAY: Final = 0.7
-"""Factor for the position errors that an uncertain heading causes.
-
-There are two such errors: one along the motion, and one across it. The standard deviation of each
-error is a fraction of the driven distance. This fraction is the factor times the variance of the
-heading (rad²), but at most 1.
-"""
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval.
 
@@ -76,7 +69,8 @@ class Doubt:
     def reset(self) -> None:
         """Set all errors to zero, because the odometry frame begins at the robot's present pose."""
         self._walk = Covariance()
-        self._levers = [(0.0, 0.0, 0.0)] * 5
+        self._astray = Astray()
+        self._levers = [(0.0, 0.0, 0.0)] * 3
         self._bend_before_rad = 0.0
 
     def moved(
@@ -115,14 +109,11 @@ class Doubt:
         ]
         self._walk = self._walk.carried(dx_m, dy_m).with_errors(errors)
         drift_rad = seconds if way_m or turn_rad else 0.0
-        yaw_variance = self._walk.yaw_yaw + self._levers[2][2] ** 2
-        astray = min(1.0, ASTRAY * yaw_variance)
+        self._astray.move(dx_m, dy_m, self._walk.yaw_yaw + self._levers[2][2] ** 2)
         own = (
             (dx_m, dy_m, 0.0),
             (0.0, 0.0, drift_rad),
             (bend_m * cos, bend_m * sin, bend_rad),
-            (astray * dx_m, astray * dy_m, 0.0),
-            (-astray * dy_m, astray * dx_m, 0.0),
         )
         self._levers = [
             (x - dy_m * yaw + own_x, y + dx_m * yaw + own_y, yaw + own_yaw)
@@ -194,8 +185,8 @@ class Doubt:
         object does not store them.
         """
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
-        size, bias, *others = self._levers
-        errors = [(scale, *size), (drift, *bias), *((1.0, *lever) for lever in others)]
+        size, bias, bend = self._levers
+        errors = [(scale, *size), (drift, *bias), (1.0, *bend), *_around(self._astray.m2, 0.0)]
         return self._walk.with_errors([*errors, *more])
 
 

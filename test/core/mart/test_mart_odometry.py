@@ -11,9 +11,11 @@ from honesty import RARE, nees
 from mart_bench import MartBench
 
 from omnibot_driver.core.mart import MartSettings, State
+from omnibot_driver.core.mart.doubt import Doubt
 from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.odometry import MartOdometry
 from omnibot_driver.core.mart.states import Motion
+from omnibot_driver.core.odometry.covariance import UNKNOWN_YAW_VARIANCE
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
 
@@ -305,3 +307,18 @@ def test_the_covariance_includes_a_change_that_is_carried_out_twice(
     assert first
     assert abs(bench.error.yaw_rad) > 0.1
     assert nees(bench) < RARE
+
+
+def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
+    """Twice, the robot may have turned by any angle. It drives 2 m forward, and later 2 m back.
+
+    The two true directions differ, so x is uncertain by more than 1 m.
+
+    Bug: the errors of both drives cancelled each other, and x was uncertain by a few mm.
+    """
+    doubt = Doubt(MartSettings())
+    for step_m in (0.2, -0.2):
+        doubt.add(0.0, UNKNOWN_YAW_VARIANCE)
+        for _ in range(10):
+            doubt.moved(0.0, step_m, 0.0, 1.0, on_the_spot=False, bend=0.0, aside_m=0.0)
+    assert 1.0 < math.sqrt(doubt.total([]).xx) < 5.0
