@@ -56,13 +56,15 @@ PARAMETERS: Final = table(
         },
         "odom_linear_scale": {
             "description": "True distance divided by the distance that odom shows while this"
-            " parameter is 1. The driver multiplies measured distances by this ratio. The command"
-            " `calibrate scale` corrects metres_per_count instead."
+            " parameter is 1. The driver multiplies measured distances by this ratio. To"
+            " correct distances, the command `calibrate scale` finds metres_per_count, not this"
+            " parameter."
         },
         "odom_angular_scale": {
             "description": "True angle of a turn divided by the angle that odom shows after the"
             " turn while this parameter is 1. The driver multiplies the angles of the controller's"
-            " gyro by this ratio. track corrects the angles that only the right wheel measures."
+            " gyro by this ratio. The parameter track corrects the angles that only the right"
+            " wheel measures."
         },
         "port": {
             "default": "udp://192.168.1.50:5000",

@@ -83,8 +83,8 @@ OMNIBOT: Final = (
         "use_board_pose",
         True,
         "",
-        "Correct the odometry with the board's own pose. If false, that pose only gives the"
-        " first heading and shows a restart of the board.",
+        "Correct the odometry with the board's own pose. If false, the driver uses that pose only"
+        " for the first heading, and to detect a restart of the board.",
     ),
     Parameter(
         "pose_byte_order",

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stop of a motion, and the server that does not answer it.
+"""The stop of a motion, and what happens if the server does not answer the stop.
 
 This module knows the stop commands and the replies to them; it does not know how a motion begins,
 or why it must end. The caller passes the time.
@@ -22,11 +22,11 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 UNCONTROLLED: Final = (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)
 LOST_REPEAT_S: Final = 1.0
 STRANGE_ROUNDS: Final = 6
-"""Number of stop commands after which the driver reports an unexpected reply to them."""
+"""Number of stop commands after which the driver reports an unexpected reply to a stop."""
 STRANGE: Final = (
-    "the server answers a stop by '{}', which does not show that no motion is in progress;"
-    " the driver expects 'no motion in progress' (SRM) or 'no motion' (SM): check that the server"
-    " is a MART controller, and update it"
+    "the server answers a stop by '{}', so the driver does not know whether a motion is in"
+    " progress, and starts none; it expects 'fail no motion in progress' (SRM) or 'fail no motion'"
+    " (SM): check that the server is a MART controller, and update it"
 )
 NAMES: Final = {
     Motion.REFERENCE: "RM",

@@ -82,7 +82,9 @@ def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[
 def main() -> None:
     """Print a row of results for each kind of network, without and with goals."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("drives", nargs="?", type=int, default=20, help="for each network")
+    parser.add_argument(
+        "drives", nargs="?", type=int, default=20, help="number of drives for each network"
+    )
     count = parser.parse_args().drives
     print(
         "| Network | Motions | Mean at the end | Mean | Median | Beyond 16.3 |\n" + "|---" * 6 + "|"

@@ -78,7 +78,9 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
 def main() -> None:
     """Print a row of results for each kind of network."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("drives", nargs="?", type=int, default=20, help="for each network")
+    parser.add_argument(
+        "drives", nargs="?", type=int, default=20, help="number of drives for each network"
+    )
     count = parser.parse_args().drives
     print(
         "| Network | Robot at rest at the end, server answers |"

@@ -112,7 +112,9 @@ def random_goal(random: Random) -> Pose:
 def main() -> None:
     """Print a row of results for each kind of network."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("runs", nargs="?", type=int, default=10, help="for each network")
+    parser.add_argument(
+        "runs", nargs="?", type=int, default=10, help="number of runs for each network"
+    )
     count = parser.parse_args().runs
     print(
         "| Network | Goals reached | Discarded | Largest error of the odometry |\n"

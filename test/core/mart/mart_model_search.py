@@ -128,7 +128,13 @@ def _way(world: World, came: dict[World, tuple[World, str] | None]) -> list[str]
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("copies", nargs="?", type=int, default=model.MOST_COPIES)
+    parser.add_argument(
+        "copies",
+        nargs="?",
+        type=int,
+        default=model.MOST_COPIES,
+        help="largest number of late copies",
+    )
     model.MOST_COPIES = parser.parse_args().copies  # type: ignore[misc]
     began_s = time.monotonic()
     result = search()
