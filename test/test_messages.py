@@ -147,9 +147,10 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 
 
 def test_an_unknown_heading_is_published_with_the_variance_of_an_unknown_direction() -> None:
-    """The variance of the yaw is 66 rad², more than a quaternion can be wrong.
+    """The variance of the yaw is 66 rad². The error of a direction cannot be so large.
 
-    ``odom`` has π²/3 rad². The errors of the position stay, and the matrix is positive definite.
+    ``odom`` has π²/3 rad². The variances of the position stay the same, and the matrix is positive
+    definite.
     """
     estimate = OdometryEstimate(
         0.0,

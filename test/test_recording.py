@@ -228,9 +228,10 @@ def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
 
 
 def test_a_bag_that_breaks_off_before_its_first_message_says_so(tmp_path: Path) -> None:
-    """The bag of a killed recorder has no complete message. The message says that it is incomplete.
+    """The bag of a killed recorder has no complete message. The error says that it is incomplete.
 
-    The bag may have been recorded with the raw bytes, so this advice alone would mislead.
+    The error also advises to record the raw bytes. This alone would be misleading, because the bag
+    may have been recorded with them.
     """
     file = bag(tmp_path / "bag", RX) / "bag.mcap"
     file.write_bytes(file.read_bytes()[:60])
@@ -243,7 +244,7 @@ def test_a_bag_that_breaks_off_before_its_first_message_says_so(tmp_path: Path) 
 def test_a_damaged_part_within_a_bag_is_reported(tmp_path: Path, given: str) -> None:
     """A part of a finished mcap file is damaged, and the library skips what follows in its chunk.
 
-    The replay has the packets before the damage, and says at its end how many are missing.
+    The replay has the packets before the damage. Then it reports how many messages can be read.
     """
     path = bag(tmp_path / "bag", RX)
     file = path / "bag.mcap"

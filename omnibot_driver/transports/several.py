@@ -206,7 +206,7 @@ class Several:
             self._changed = True
 
     def _leads(self, channel: int) -> bool:
-        paths = [os.path.realpath(name) for name in self._names]  # a link may change at any time
+        paths = [os.path.realpath(name) for name in self._names]  # a symbolic link may change
         own = paths.pop(channel)
         return all(own < other for other in paths)
 

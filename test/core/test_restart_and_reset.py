@@ -166,7 +166,7 @@ def test_a_disproved_restart_leaves_no_more_uncertainty_than_the_motion_that_was
     ``use_board_pose`` is False, so the pose does not correct odom. Motion by ``lost_m`` is missing
     in odom. The covariance contains an error of this size in any direction, and no more.
 
-    Bug: after such a suspicion, the yaw was uncertain by 0.3 rad for good.
+    Bug: after such a suspicion, the yaw stayed uncertain by 0.3 rad.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip(0.7)
     attach(odometry, trip.pose)

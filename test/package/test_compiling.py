@@ -2,8 +2,8 @@
 
 """Tests of an installation with ``OMNIBOT_DRIVER_COMPILE=1``, which compiles a part of the core.
 
-mypyc and the C compiler take a minute. So either a substitute for mypyc makes one small C module,
-or a substitute for the C compiler does nothing.
+mypyc and the C compiler take a minute. So in these tests, either a substitute for mypyc
+makes one small C module, or a substitute for the C compiler does nothing.
 """
 
 import os

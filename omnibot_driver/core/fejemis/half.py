@@ -101,8 +101,8 @@ class Half:
         resets this flag."""
         self._told: int | None = None
         self._started = False
-        """Whether a board has sent its start message, but no heartbeat yet: which board it is, is
-        unknown."""
+        """Whether the board has sent its start message, but no heartbeat yet. Only the heartbeat
+        shows which board has restarted."""
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
         self._at: dict[str, float] = {}

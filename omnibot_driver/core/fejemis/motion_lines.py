@@ -3,9 +3,9 @@
 """Writes motion lines (``rc``) in which damage is detected, or has a limited effect.
 
 Several lines command the same motion: the front board uses only the ratio of speed and turn rate,
-the drive board only the root of the sum of their squares. With a checksum, the line is one in which
-the checksum detects the loss of any two characters. Without a checksum, some losses, such as that
-of a decimal point, still give a wrong number until the next line.
+the drive board only the root of the sum of their squares. With a checksum, this module chooses
+a line in which the checksum detects the loss of any two characters. Without a checksum, some
+losses, such as the loss of a decimal point, give a wrong number that is valid until the next line.
 """
 
 import math

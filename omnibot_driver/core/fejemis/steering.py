@@ -79,7 +79,9 @@ def outer_mps(twist: BodyTwist, track_m: float) -> float:
 def steer(
     wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
 ) -> Steered:
-    """Return the command for both boards that gives the body the motion ``wanted``, not a stop.
+    """Return the command for both boards that gives the body the twist ``wanted``.
+
+    ``wanted`` is not zero.
 
     ``angle_rad``: the front wheel's measured angle; None while unknown.
 

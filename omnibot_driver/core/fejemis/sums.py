@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Adds the checksum ``;NN`` in front of a line, and checks it. It does not detect:
+"""Adds the checksum ``;NN`` in front of a line, and checks it.
+
+The checksum does not detect:
 
 * 1 in 99 random changes.
 * The loss of a ``c``, whose code is 99.

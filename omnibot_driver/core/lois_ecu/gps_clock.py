@@ -12,7 +12,8 @@ UNKNOWN_FROM_YEAR: Final = 38
 """Two-digit year (38 for 2038). A date from this year on is false: the GPS receiver does not have
 the date yet."""
 LONGEST_GAP_S: Final = 12 * 3600
-"""Time in s without a reported time of day. After it, midnight may have passed unseen."""
+"""Time in s without a reported time of day, after which the date is no longer used: midnight may
+have passed unseen."""
 
 
 class GpsClock:

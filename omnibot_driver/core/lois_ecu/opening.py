@@ -64,11 +64,11 @@ RECOVER_AFTER_S: Final = 3.0
 boot, which takes two seconds."""
 UNANSWERED_S: Final = 5.0
 """Time in s after which the driver restores the board's mode if no date has arrived, although the
-board sends. On a bad line, there may be too few ticks for more rounds."""
+board sends reports. On a bad line, too few ticks may arrive to start further rounds."""
 RESYNC: Final = b"::"
 """Characters between a line with a checksum and one without. To a board that expects no checksums,
 the first line is too long, and its end stays in the board's memory. If the second line then lost
-its only ``:`` and one more character, both could form a motion command."""
+its only ``:`` and one more character, both lines together could form a motion command."""
 
 
 class SettingsWriter:
@@ -261,7 +261,7 @@ class SettingsWriter:
         * A terminal mode gets two lines while the settings are unconfirmed, and after ``repeat``.
           The first line has a checksum: a board that has just booted obeys only lines with a
           checksum. If no motion is commanded, Stop follows, because the board may have ignored the
-          Stops before.
+          earlier Stops.
         * Stop never has a checksum (see ``_begin_round``).
         """
         if command == outbound.STOP:
@@ -332,7 +332,7 @@ class SettingsWriter:
         correction = encode_command(
             left_short_correction(self.settings), with_sum=self.settings.with_sum
         )
-        # Before, the board may have obeyed a damaged line, and ignored each Stop after it.
+        # The board may have obeyed a damaged line earlier, and ignored each Stop after that line.
         stop = outbound.lines(outbound.STOP, outbound.STOP, with_sum=self.settings.with_sum)
         return _both_forms(back) + correction + stop
 

@@ -49,9 +49,9 @@ def sets_ticks(command: Command) -> bool:
 
 
 def left_short_correction(settings: LoisEcuSettings) -> WriteSetting:
-    """Return the command that writes the left short correction, by default its value after a boot.
+    """Return the command that writes the left short correction, which the terminal mode overwrites.
 
-    The terminal mode overwrites this setting.
+    If the user has not set it, the command writes the value that the board has after a boot.
     """
     setting = Setting.LEFT_SHORT_CORRECTION
     return WriteSetting(setting, settings.written.get(setting, BOOT_LEFT_SHORT_CORRECTION))

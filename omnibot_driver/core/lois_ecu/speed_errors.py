@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assumed errors of the speed that a wheel has under its set-point, as states of the motion filter.
+"""Assumed errors of a wheel's speed relative to its set-point, as states of the motion filter.
 
 The errors depend on the kind of the command that the wheel follows.
 """

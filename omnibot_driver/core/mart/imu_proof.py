@@ -29,7 +29,8 @@ If a check takes longer, the network is assumed to have delayed request and repl
 the additional time is then the age of the result when it arrives.
 """
 EARLY: Final = 4
-"""After this number of checks in a row whose only reply came too early, the driver reports it."""
+"""Number of successive checks, each with only a reply that came too early, after which the driver
+reports the server's fast replies."""
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
@@ -86,7 +87,7 @@ class ImuProof:
 
     @property
     def trouble(self) -> str:
-        """Why no check succeeds although the server answers, with a remedy; empty if none fails."""
+        """A text for the user if the server answers each check too early; otherwise empty."""
         if self._early < EARLY:
             return ""
         return (

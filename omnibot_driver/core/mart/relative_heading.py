@@ -108,8 +108,8 @@ class RelativeHeading:
 
         ``stood_s``: time at which the robot was stopped, infinite while it is driven.
 
-        ``scale``: true turn to the left divided by the change of the reported heading. It may
-        change during a motion, without a turn.
+        ``scale``: true turn to the left divided by the change of the reported heading. The
+        scale may change during a motion. Such a change is not regarded as a turn.
         """
         if not abs(angle_rad) < MOST_RAD:
             self.forget()

@@ -28,9 +28,11 @@ ROUNDS: Final = 3
 port."""
 STOP_PORT_TIMES: Final = 3
 SURPLUS: Final = 4
-"""A server may answer both SRM and SM by 'no motion' if no motion is in progress. After ROUNDS
-rounds, the driver then requires this number of replies more than rounds. Then SRM was answered too,
-unless each SRM was lost and several replies to SM were duplicated.
+"""Number by which replies with the text 'no motion' must exceed the rounds of SRM and SM.
+
+If no motion is in progress, a server may answer both commands by this text. From ``ROUNDS`` rounds
+on, this surplus shows that SRM was answered too, unless each SRM was lost and several replies to SM
+were duplicated.
 """
 ANSWERS: Final = {
     Motion.REFERENCE: (Form.NOTHING,),
@@ -91,7 +93,7 @@ class Stopping:
 
     ``rounds``: how often the stop was sent to the command port.
 
-    ``strange``: the last failure that does not answer a stop command; empty without one.
+    ``strange``: text of the last failure that is not a known answer to the stop; empty without one.
     """
 
     def __init__(

@@ -106,7 +106,7 @@ class Covariance:
         """The covariance if the yaw is regarded as a direction, as in a quaternion.
 
         Whole turns do not change a direction. So the variance of the yaw is at most that of an
-        unknown direction, and an uncertain direction says less about the position.
+        unknown direction. The covariances of yaw and position decrease by the same factor.
         """
         if self.yaw_yaw <= UNKNOWN_YAW_VARIANCE:
             return self
@@ -243,8 +243,8 @@ class Uncertainty:
         the old frame shows that the board has not restarted, and how the robot has moved. Unlike
         ``gap``, this uncertainty does not increase the tolerance for poses.
 
-        ``way_m``, ``turn_rad``: mean distance and angle in which the robot came to rest. A large
-        angle makes the heading unknown, and no more.
+        ``way_m``, ``turn_rad``: mean distance and angle in which the robot came to rest. The
+        variance of the heading becomes at most that of an unknown heading.
         """
         variance = min(turn_rad * turn_rad, UNKNOWN_YAW_VARIANCE)
         self._halt += Covariance.diagonal(way_m * way_m, variance)

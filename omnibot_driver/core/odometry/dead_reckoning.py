@@ -51,7 +51,8 @@ class DeadReckoning:
             if last_stamp_s is not None:  # otherwise the odometry begins here, without a gap
                 track.miss(UNKNOWN_S)
                 if reading.restarted and last is not None:
-                    drove_s = stamp_s - last_stamp_s - reading.up_s  # at most, before the restart
+                    # the longest time for which the robot may have driven before the restart
+                    drove_s = stamp_s - last_stamp_s - reading.up_s
                     halt = max(UNKNOWN_S, drove_s) / 2 / last[1]
                     track.halt(last[0].times(halt, halt, halt))
                 seconds = max(0.0, stamp_s - last_stamp_s)

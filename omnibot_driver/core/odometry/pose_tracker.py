@@ -117,8 +117,8 @@ class PoseTracker:
     def bound(self, tangent: Pose) -> None:
         """Replace the uncertainty of all gaps until now.
 
-        ``tangent``: the error that the gaps have caused. A pose of the board has shown this error,
-        but the settings forbid to correct it.
+        ``tangent``: the error that the gaps have caused. A pose of the board has shown this error.
+        It stays in the odometry, because the settings do not allow a correction.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)

@@ -30,8 +30,8 @@ LOOK_S: Final = 1.0
 SLOW_LOOK_S: Final = 3.0
 """Time, in s, that replaces ``LOOK_S`` for a board with one of the parameters ``SLOW``."""
 SLOW: Final = ("odom_rate", "front_wheel_offset")
-"""Parameters of boards that follow a command late: the board rarely measures its motion, or its
-front wheel must first turn to the new direction."""
+"""Each of these parameters shows that a board's measured motion may follow a command late. Either
+the board rarely measures its motion, or its front wheel must first turn to the new direction."""
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"

@@ -84,7 +84,7 @@ def test_settings_that_lose_up_to_two_characters_never_command_a_motion(with_sum
     """The board expects no checksums, and the driver writes its settings and the terminal mode.
 
     Some of these lines have a checksum, and are too long for the board. Up to two characters are
-    lost. The firmware never finds a motion command in the rest.
+    lost. The firmware never finds a motion command in the remaining characters.
 
     Bug: a Stop with a checksum lost two zeros, and commanded 59 % duty to the right wheel.
     """

@@ -97,7 +97,7 @@ def test_after_a_day_without_a_time_the_old_date_is_not_used() -> None:
 
 @pytest.mark.parametrize("day", [GpsDate(26, 2, 31), GpsDate(26, 2, 29), GpsDate(26, 4, 31)])
 def test_a_date_that_the_calendar_does_not_have_is_not_used(day: GpsDate) -> None:
-    """The board reports the 31st of February. The driver does not make the 3rd of March of it."""
+    """The board reports the 31st of February. The driver does not use the 3rd of March instead."""
     ecu = LoisConversation(LoisEcuSettings())
     found = ecu.receive(encode_report(day) + encode_report(GpsTime(9, 0, 0)), 0.0)
     assert found == [TimeReading(None)]

@@ -230,7 +230,8 @@ def test_two_stops_with_one_text_are_both_answered_if_the_texts_outnumber_one_of
     """A server answers SRM and SM by the same text if no motion is in progress.
 
     The driver has to know that both were answered. With two replies to each round, it knows this
-    after four rounds. With one reply to each round, all may answer SM, and it never knows.
+    after four rounds. With one reply to each round, all replies may answer SM, so the driver never
+    knows.
     """
     for replies, rounds in ((2, 4), (1, None)):
         stop, proved = stopping(Motion.UNKNOWN), None

@@ -200,7 +200,7 @@ def test_a_command_that_the_server_does_not_know_is_named_as_the_reason(word: by
 
 
 def translate(bench: MartBench, texts: dict[bytes, bytes]) -> None:
-    """Make the server of ``bench`` send other texts. ``texts``: its own text to the other one."""
+    """Make the server of ``bench`` replace its texts. ``texts``: the new text for each old one."""
     advance = bench.robot.advance
     bench.robot.advance = lambda: [  # type: ignore[method-assign]
         (channel, texts.get(data, data)) for channel, data in advance()

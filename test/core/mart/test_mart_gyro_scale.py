@@ -57,7 +57,7 @@ def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -
 
 
 def test_a_gyro_that_measures_half_of_each_turn_makes_no_turn_seem_late() -> None:
-    """A controlled turn lasts as long as the robot needs for the true angle, not for the requested.
+    """The driver expects that the true angle, not the requested one, determines a turn's duration.
 
     Bug: each turn to a goal seemed to last long enough for two turns, so the heading was then
     uncertain by more than 2 rad.

@@ -168,9 +168,10 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
 
 
 def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_before_it() -> None:
-    """A board was unheard for 3 s, and reports that it restarted 0.2 s ago.
+    """After 3 s without data, a board reports that it restarted 0.2 s ago.
 
-    Until then, the robot may have driven on at 0.5 m/s: the covariance includes half of this way.
+    Until the restart, the robot may have continued at 0.5 m/s. The covariance includes half of this
+    distance.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -186,8 +187,8 @@ def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_
 def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> None:
     """A board restarts after 40 s without data, in which the robot may have turned at 1 rad/s.
 
-    Then it drives 2 m. Odom shows this drive along x, but its direction is unknown. So the position
-    becomes uncertain by 1 to 5 m in x and in y.
+    Then the robot drives 2 m. Odom shows this drive along x, but its direction is unknown. So the
+    position becomes uncertain by 1 to 5 m in x and in y.
 
     Bug: y became uncertain by 40 m.
     """
