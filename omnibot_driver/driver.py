@@ -25,7 +25,10 @@ LONGEST_END_S: Final = 5.0
 """Longest time from the event that ends the driver to the end of the process, in s."""
 LARGEST_DOMAIN: Final = 232
 """Largest ROS_DOMAIN_ID of Fast DDS. A larger one would require UDP ports above 65535."""
-USAGE: Final = "give parameters like this: --ros-args -p port:=/dev/ttyUSB0"
+USAGE: Final = (
+    "give parameters like this: --ros-args -p port:=/dev/ttyUSB0; names like this:"
+    " --ros-args -r __ns:=/robot1"
+)
 HELP: Final = f"""\
 usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]
 
@@ -139,7 +142,7 @@ def _main(ending: Ending, args: list[str]) -> int:
     if get_rmw_implementation_identifier().startswith("rmw_fastrtps") and too_large(domain):
         return _refuse(f"ROS_DOMAIN_ID is {domain}; Fast DDS allows at most {LARGEST_DOMAIN}")
     try:
-        # ROS itself would take ``port:=/dev/x`` for a topic's new name, and ignore it.
+        # ROS itself would take ``port:=/dev/x`` for a topic's new name in the deprecated form.
         if unknown := split_ros_arguments(args[1:])[0]:
             return _refuse(f"unknown argument {' '.join(unknown)}; {USAGE}")
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)

@@ -96,7 +96,18 @@ def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
     assert f"cannot start: unknown argument {' '.join(words)}; give parameters" in ended.stderr
-    assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
+    assert "give parameters like this: --ros-args -p port:=/dev/ttyUSB0;" in ended.stderr
+
+
+@pytest.mark.parametrize("before", [[], ["--ros-args"]])
+@pytest.mark.parametrize("word", ["cmd_vel:=x", "__ns:=/robot1"])
+def test_a_forgotten_r_is_told_with_what_to_write(before: list[str], word: str) -> None:
+    """The user forgets ``-r`` before a new name. The message shows how to write it."""
+    command = [sys.executable, "-m", "omnibot_driver.driver", *before, word]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert ended.returncode == 2
+    assert f"cannot start: unknown argument {word}; give" in ended.stderr
+    assert ended.stderr.endswith("names like this: --ros-args -r __ns:=/robot1\n")
 
 
 @pytest.mark.parametrize(
