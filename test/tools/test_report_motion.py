@@ -210,6 +210,17 @@ def test_a_front_wheel_may_turn_before_the_robot_moves(drive: Drive) -> None:
     assert not any("stood still" in finding.text for finding in judge(of_a_fejemis(drive)))
 
 
+def test_a_robot_with_two_wheels_that_never_moves_in_short_drives_is_wrong(drive: Drive) -> None:
+    """A Fejemis stands still in drives of 2 s each. The level of this finding is BAD.
+
+    Bug: each drive was shorter than a slow start, so the report did not mention the standstill.
+    """
+    drive.cmd_vel.values[drive.cmd_vel.stamp_s % 4.0 < 2.0] = 0.0
+    drive.odom.values[:] = 0.0
+    found = [each for each in judge(of_a_fejemis(drive)) if "stood still although" in each.text]
+    assert [each.level for each in found] == [Level.BAD]
+
+
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
     """Commands are missing for a while. The report notes this, since it explains a standstill."""
     drive.cmd_vel.drop(10.0, 10.8)

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Final
 
 import numpy as np
@@ -35,7 +36,8 @@ STANDS: Final = 0.2
 SUSTAINED_S: Final = 1.0
 SLOW_START_S: Final = 3.0
 """Time in s for which a robot with two driving wheels may stand still although it is commanded to
-move: its front wheel may have to turn first, or its motors may start slowly."""
+move: its front wheel may have to turn first, or its motors may start slowly. Successive standstills
+without a motion between them count together."""
 AFTER_STOP_S: Final = 1.5
 """Time in s within which the robot must come to rest after an e-stop, or after the last command has
 timed out."""
@@ -147,9 +149,10 @@ def judge(log: Log) -> Iterator[Finding]:
     if not len(times_s):
         return
     free = ~_stopped(log, times_s)
-    stalls = _sustained(times_s, free & (told > TOLD) & (moved < STANDS * told))
-    longest_s = SLOW_START_S if log.two_wheels else SUSTAINED_S
-    yield from _stalled([stall for stall in stalls if stall.length_s >= longest_s])
+    commanded, stands = free & (told > TOLD), moved < STANDS * told
+    stalls = _sustained(times_s, commanded & stands)
+    moves_s = times_s[commanded & ~stands]
+    yield from _stalled(_without_slow_starts(stalls, moves_s) if log.two_wheels else stalls)
     for pair in found:
         usable = ~_stopped(log, pair.measured.stamp_s)
         usable &= ~log.within(stalls, pair.measured.stamp_s)
@@ -194,6 +197,22 @@ def _sustained(times_s: Array, rows: Mask) -> list[Span]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]
+
+
+def _without_slow_starts(stalls: list[Span], moves_s: Array) -> list[Span]:
+    """Return the ``stalls`` that are longer than a slow start (``SLOW_START_S``).
+
+    Stalls count together if the robot does not move between them, so that a robot which never moves
+    is found although each of its drives is short. ``moves_s``: the times at which it moves.
+    """
+    groups = groupby(stalls, key=lambda stall: int(np.searchsorted(moves_s, stall.begin_s)))
+    together = [list(group) for _, group in groups]
+    return [
+        stall
+        for group in together
+        if sum(each.length_s for each in group) >= SLOW_START_S
+        for stall in group
+    ]
 
 
 def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
