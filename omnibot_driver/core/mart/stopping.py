@@ -8,7 +8,6 @@ knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
-from collections import Counter
 from typing import Final
 
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
@@ -27,13 +26,6 @@ ROUNDS: Final = 3
 """Number of stop commands that the driver sends to the command port before it uses the stop
 port."""
 STOP_PORT_TIMES: Final = 3
-SURPLUS: Final = 4
-"""Number by which replies with the text 'no motion' must exceed the rounds of SRM and SM.
-
-If no motion is in progress, a server may answer both commands by this text. From ``ROUNDS`` rounds
-on, this surplus shows that SRM was answered too, unless each SRM was lost and several replies to SM
-were duplicated.
-"""
 ANSWERS: Final = {
     Motion.REFERENCE: (Form.NOTHING,),
     Motion.REVERSE: (Form.NOTHING,),
@@ -93,7 +85,8 @@ class Stopping:
 
     ``rounds``: how often the stop was sent to the command port.
 
-    ``strange``: text of the last failure that is not a known answer to the stop; empty without one.
+    ``strange``: text of a failure that alone does not show the end of the motion; empty without
+    one. A text that is no known answer to the stop takes precedence.
     """
 
     def __init__(
@@ -126,7 +119,7 @@ class Stopping:
         self._doubtful: list[tuple[Ok, bool]] = []
         self.rounds = 0
         self.strange = ""
-        self._negative: Counter[str] = Counter()
+        self._negative: set[str] = set()
         longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
         self._patience_s = (3.0 if move is not None else longest_s) + 2 * delay_s
         self._silent_from_s = now + self._patience_s
@@ -188,10 +181,9 @@ class Stopping:
         if now < self._unsure_until_s:
             return False
         if none and isinstance(reply, Fail):
-            self._negative[reply.reason] += 1
-        if self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion]):
-            return True
-        return self.rounds >= ROUNDS and self._negative[NO_MOTION] >= self.rounds + SURPLUS
+            self._negative.add(reply.reason)
+            self.strange = self.strange or f"fail {reply.reason}"
+        return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
     def doubt(self, reply: Ok, *, likely: bool = True) -> None:
         """Record a doubtful reply. It may answer the stop command, be late, or be a copy.

@@ -158,7 +158,7 @@ RMCS = _word("RMCS", Kind.CHANGE, _DECIMAL, 0.05, {NOT_IN_MOTION, ""} | OBSTACLE
 CS = _word("CS", Kind.CHANGE, _OK, 0.05, {"", NOT_IN_MOTION})
 
 # SRM stops RM; SM stops B, R and L; SL and SS use the stop port
-SRM = _word("SRM", Kind.HALT, _OK, 2.2, STOPPING | OBSTACLES | {NOT_IN_MOTION, NO_MOTION})
+SRM = _word("SRM", Kind.HALT, _OK, 2.2, STOPPING | OBSTACLES | {NOT_IN_MOTION})
 SM = _word("SM", Kind.HALT, _OK | _INTEGER, 2.2, STOPPING | OBSTACLES | {NO_MOTION, GYRO})
 SL = _word("SL", Kind.HALT, set(), 0.0, channel=STOP)
 SS = _word("SS", Kind.HALT, set(), 0.0, channel=STOP)

@@ -226,24 +226,6 @@ def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
     assert stop.hear(parse(b"fail no motion"), 10.61)
 
 
-def test_two_stops_with_one_text_are_both_answered_if_the_texts_outnumber_one_of_them() -> None:
-    """A server answers SRM and SM by the same text if no motion is in progress.
-
-    The driver has to know that both were answered. With two replies to each round, it knows this
-    after four rounds. With one reply to each round, all replies may answer SM, so the driver never
-    knows.
-    """
-    for replies, rounds in ((2, 4), (1, None)):
-        stop, proved = stopping(Motion.UNKNOWN), None
-        for number in range(1, 21):
-            now = 10.0 + 1.01 * REPEAT_S * number
-            assert stop.due(now) == (words.SRM, words.SM)
-            if any(stop.hear(parse(b"fail no motion"), now) for _ in range(replies)):
-                proved = number
-                break
-        assert proved == rounds
-
-
 def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
     """After three unanswered stops, the driver uses the stop port.
 

@@ -207,25 +207,7 @@ def translate(bench: MartBench, texts: dict[bytes, bytes]) -> None:
     ]
 
 
-@pytest.mark.parametrize("firmware", FIRMWARES)
-def test_a_server_that_has_one_text_for_no_motion_is_driven(firmware: Firmware) -> None:
-    """The server answers SRM by "no motion", the text that other servers have for SM only.
-
-    The driver connects, drives, and stops.
-    """
-    bench = MartBench(firmware)
-    translate(bench, {b"fail no motion in progress": b"fail no motion"})
-    bench.ready()
-    assert bench.session.state == "nominal"
-    bench.command(0.3, 0.0, 2.0)
-    assert not bench.robot.stands
-    bench.server.receive(b"SRM", 0, None, bench.robot.board.now_s)
-    bench.command(0.0, 0.0, 2.0)
-    assert bench.robot.stands
-    assert not any("lost" in notice for notice in bench.notices)
-
-
-@pytest.mark.parametrize("text", ["fail command not supported", "fail"])
+@pytest.mark.parametrize("text", ["fail command not supported", "fail", "fail no motion"])
 def test_a_server_with_an_unknown_answer_to_a_stop_is_named(text: str) -> None:
     """The server answers SRM by a text that shows nothing, so the driver stays connecting.
 
