@@ -16,6 +16,7 @@ import pytest
 import rclpy
 import yaml
 from rclpy.context import Context
+from rclpy.node import Node
 
 from omnibot_driver import boards
 from omnibot_driver.boards.omnibot import PARAMETERS
@@ -175,7 +176,7 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
     The lock has priority over all sources.
     """
-    mux = parameters("twist_mux.yaml", "twist_mux")
+    mux = parameters("twist_mux.yaml", "/**")
     (lock,) = mux["locks"].values()
     assert lock["topic"] == f"{NODE}/estop_active"
     assert lock["topic"] in DRIVER
@@ -189,12 +190,31 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
     Their timeout is the driver's command timeout. Their message type is the one that the driver
     expects.
     """
-    mux = parameters("twist_mux.yaml", "twist_mux")
+    mux = parameters("twist_mux.yaml", "/**")
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}
     assert not DRIVER & {source["topic"] for source in sources}
     assert mux["use_stamped"] is PARAMETERS.by_name["enable_stamped_cmd_vel"].default
     assert "-r cmd_vel_out:=cmd_vel\n" in (CONFIG / "twist_mux.yaml").read_text()
+
+
+@pytest.mark.parametrize("namespace", ["/", "/robot1"])
+def test_the_mux_reads_its_file_in_each_namespace(namespace: str) -> None:
+    """The file is for twist_mux in any namespace, because each robot has one in its own.
+
+    Bug: in a namespace, twist_mux had no parameters, so it forwarded no command.
+    """
+    context = Context()
+    arguments = ["--params-file", str(CONFIG / "twist_mux.yaml"), "-r", f"__ns:={namespace}"]
+    rclpy.init(args=["--ros-args", *arguments], context=context)
+    try:
+        node = Node(
+            "twist_mux", context=context, automatically_declare_parameters_from_overrides=True
+        )
+        assert node.get_parameter("locks.estop.topic").value == f"{NODE}/estop_active"
+        node.destroy_node()
+    finally:
+        rclpy.shutdown(context=context)
 
 
 def test_rviz_shows_topics_and_frames_that_exist() -> None:
