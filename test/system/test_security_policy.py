@@ -3,14 +3,17 @@
 """Tests that compare config/omnibot.policy.xml with SROS2's schema 0.2.0 and a running driver."""
 
 from collections.abc import Callable
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import pytest
+import rclpy
 from driver_process import Driver
 from probe import Probe
+from rclpy.context import Context
 from rclpy.node import Node, NodeNameNonExistentError
 from sensor_msgs.msg import Imu
 
@@ -42,9 +45,9 @@ The keys are the kinds of use: ``publish``, ``subscribe``, ``reply`` and ``reque
 """
 
 
-def profiles() -> dict[str, Element]:
+def profiles(policy: Path = POLICY) -> dict[str, Element]:
     """Return the only profile of each enclave. The keys are the paths of the enclaves."""
-    enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
+    enclaves = ElementTree.parse(policy).getroot().iter("enclave")
     return {enclave.attrib["path"]: next(enclave.iter("profile")) for enclave in enclaves}
 
 
@@ -134,9 +137,45 @@ def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: s
     driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
     everywhere = {"/rosout", "/parameter_events", "/clock"}
     assert other["publish"] <= driver["subscribe"] | everywhere
-    assert other["subscribe"] <= driver["publish"] | everywhere
+    assert other["subscribe"] <= driver["publish"] | driver["subscribe"] | everywhere
     assert other["request"] <= driver["reply"]
-    assert other["reply"] == set()
+
+
+@pytest.mark.parametrize("file", ["omnibot", "fejemis"])
+def test_operators_and_observers_may_read_all_commands(file: str) -> None:
+    """Tools and recorders also subscribe to the topics that command the robot.
+
+    Bug: under SROS2, monitor, calibrate and `report --live` failed when they subscribed to cmd_vel.
+    """
+    every = profiles(POLICY.with_name(f"{file}.policy.xml"))
+    driver = allowed(every["/omnibot/driver"])
+    for path in ("/omnibot/operator", "/omnibot/observer"):
+        assert allowed(every[path])["subscribe"] >= driver["subscribe"] | driver["publish"]
+
+
+@pytest.mark.parametrize("file", ["omnibot", "fejemis"])
+def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> None:
+    """Each enclave may do what every node of rclpy does, under the name of its profile.
+
+    The operator's tools may have any name. No other enclave may answer in the driver's name.
+
+    Bug: under SROS2, no node of these enclaves started, because each has parameter services.
+    """
+    for path, profile in profiles(POLICY.with_name(f"{file}.policy.xml")).items():
+        name = "monitor_1" if path == "/omnibot/operator" else profile.attrib["node"]
+        context = Context()
+        rclpy.init(args=[], context=context)
+        try:
+            node = Node(name, context=context)
+            rules = allowed(profile)
+            for service in node.services:
+                assert any(fnmatch(service.service_name, one) for one in rules["reply"]), path
+            assert {publisher.topic_name for publisher in node.publishers} <= rules["publish"]
+            node.destroy_node()
+        finally:
+            rclpy.shutdown(context=context)
+        if path not in ("/omnibot/driver", "/omnibot/operator"):
+            assert rules["reply"] == {f"/{name}/*"}
 
 
 def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
