@@ -162,6 +162,18 @@ def test_nav2_uses_the_drivers_topics_and_frames() -> None:
     assert {frame for key in keys for frame in everything_under(key, file)} == FRAMES
 
 
+@pytest.mark.parametrize("path", sorted(CONFIG.glob("nav2_*.yaml")), ids=lambda path: path.name)
+def test_nav2_has_the_behaviours_of_its_default_trees(path: Path) -> None:
+    """Nav2's default behaviour trees use three behaviours, so the behaviour server has all of them.
+
+    Bug: the file for a Fejemis had no backup. Then bt_navigator does not load its tree, and Nav2
+    does not start.
+    """
+    server = load(path.name)["behavior_server"]["ros__parameters"]
+    assert {"spin", "wait", "backup"} <= set(server["behavior_plugins"])
+    assert all(server[name]["plugin"] for name in server["behavior_plugins"])
+
+
 def test_every_critic_that_is_tuned_is_used() -> None:
     """Each critic of Nav2's controller that has settings is in the list of critics.
 

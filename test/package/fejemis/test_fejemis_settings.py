@@ -66,8 +66,6 @@ def test_nav2_plans_and_follows_curves_forward() -> None:
     assert smoother["max_velocity"] == [LINEAR, 0.0, ANGULAR]
     assert smoother["min_velocity"] == [0.0, 0.0, -ANGULAR]
     assert smoother["velocity_timeout"] == TIMEOUT
-    behaviours = file["behavior_server"]["ros__parameters"]
-    assert "backup" not in behaviours["behavior_plugins"]
 
 
 def description() -> Any:
