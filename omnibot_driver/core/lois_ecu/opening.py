@@ -81,7 +81,8 @@ class SettingsWriter:
         self.settings = settings
         self._points = points
         self._in_period = self._answered = False
-        self._begun_at_s = math.inf
+        self.unanswered_since_s = math.inf
+        """Time in s of the last ``begin``; infinity once a date has arrived since then."""
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
         """Commands that are not settings, for example for the LED. Each has the earliest time at
@@ -117,11 +118,6 @@ class SettingsWriter:
         True if they are still unconfirmed after twice the usual number of rounds.
         """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
-
-    @property
-    def unanswered_since_s(self) -> float:
-        """Time in s of the last ``begin``; infinity once a date has arrived since then."""
-        return math.inf if self._answered else self._begun_at_s
 
     @property
     def wake_at(self) -> float:
@@ -168,7 +164,7 @@ class SettingsWriter:
         self._queue.clear()
         self._arrivals.clear()
         self._rounds_left, self._round_at_s = ROUNDS, now
-        self._begun_at_s = now
+        self.unanswered_since_s = now
         self._rounds = self._repeated = 0
         self._in_period = self._answered = False
 
@@ -236,6 +232,7 @@ class SettingsWriter:
         """Record that a GPS date arrived. The date shows that the board obeys requests."""
         if self._rounds and not self._answered:
             self._answered = True
+            self.unanswered_since_s = math.inf
             # A request for one date ended the periodic sending. The following rounds restore the
             # period.
             if dates_come_periodically(self.settings):

@@ -9,7 +9,12 @@ import math
 
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.messages import SetTerminalMode, TerminalMode
-from omnibot_driver.core.lois_ecu.opening import RECOVER_AFTER_S, UNANSWERED_S, SettingsWriter
+from omnibot_driver.core.lois_ecu.opening import (
+    AFTER_SET_POINT_S,
+    RECOVER_AFTER_S,
+    UNANSWERED_S,
+    SettingsWriter,
+)
 from omnibot_driver.core.lois_ecu.record_request import RecordRequest
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -112,10 +117,12 @@ class Upkeep:
         if self.change.sensor_wanted or self.change.terminal or self._points.driving:
             return math.inf
         silent_since_s = self._recovered_at_s if self.writer.ignored else self.heard_at_s
-        due_at_s = min(
-            max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S,
-            max(self.writer.unanswered_since_s, self._recovered_at_s) + UNANSWERED_S,
-        )
+        due_at_s = max(silent_since_s, self._recovered_at_s) + RECOVER_AFTER_S
+        unanswered_since_s = self.writer.unanswered_since_s
+        if unanswered_since_s < math.inf:
+            due_at_s = min(due_at_s, max(unanswered_since_s, self._recovered_at_s) + UNANSWERED_S)
+        if due_at_s >= self._points.said_at_s + AFTER_SET_POINT_S:  # no set-point delays it
+            return due_at_s
         return self.writer.after_set_points(due_at_s)
 
 
