@@ -86,7 +86,7 @@ class Stopping:
     ``rounds``: how often the stop was sent to the command port.
 
     ``strange``: text of a failure that alone does not show the end of the motion; empty without
-    one. A text that is no known answer to the stop takes precedence.
+    one. The text of an unknown answer takes precedence.
     """
 
     def __init__(
