@@ -29,12 +29,13 @@ USAGE: Final = (
     "give parameters like this: --ros-args -p port:=/dev/ttyUSB0; names like this:"
     " --ros-args -r __ns:=/robot1"
 )
-HELP: Final = f"""\
+HELP: Final = """\
 usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]
 
 The driver of a robot's motor board: publishes its measurements, and sends it your commands.
 
-{USAGE[0].upper()}{USAGE[1:]}
+Give parameters like this: --ros-args -p port:=/dev/ttyUSB0
+Give names like this: --ros-args -r __ns:=/robot1
 Without a robot: --ros-args -p port:=sim://
 The parameter `board` says which board it is (default: omnibot). config/<board>.yaml has every
 parameter of that board with its default and its permitted values; docs/parameters.md has those
