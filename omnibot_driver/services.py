@@ -27,6 +27,23 @@ from omnibot_driver.qos import DEEP
 from omnibot_driver.replay import Replay
 
 
+async def ask(link: Any, question: Callable[[Session, Future, float], None], response: Any) -> Any:
+    """Ask the session a question, wait for the answer, and return it in ``response``.
+
+    ``question``: a function that gets the session, the token of the request and the time in s. It
+    raises RequestRefused with the reason if the request is refused.
+    """
+    answer = Future()
+    try:
+        link.call(lambda session, now: question(session, answer, now))
+    except RequestRefused as error:
+        response.success, response.message = False, str(error)
+        return response
+    done: RequestDone = await answer
+    response.success, response.message = done.success, done.message
+    return response
+
+
 class Services:
     """The services of one node, except those that only one kind of board has.
 
@@ -99,7 +116,7 @@ class Services:
     async def _on_calibrate_gyro(
         self, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        await self._ask(Session.calibrate_gyro, response)
+        await ask(self._link, Session.calibrate_gyro, response)
         if response.success:
             bias = list(self._link.call(lambda session, _now: session.gyro_bias))
             self._node.set_parameters([rclpy.Parameter("gyro_bias", value=bias)])
@@ -132,17 +149,6 @@ class Services:
             response.message += f"; saved to {file}"
 
     async def _request(self, request: Request, response: Any) -> Any:
-        return await self._ask(
-            lambda session, answer, now: session.request(request, answer, now), response
+        return await ask(
+            self._link, lambda session, answer, now: session.request(request, answer, now), response
         )
-
-    async def _ask(self, question: Callable[[Session, Future, float], None], response: Any) -> Any:
-        answer = Future()
-        try:
-            self._link.call(lambda session, now: question(session, answer, now))
-        except RequestRefused as error:
-            response.success, response.message = False, str(error)
-            return response
-        done: RequestDone = await answer
-        response.success, response.message = done.success, done.message
-        return response

@@ -20,6 +20,7 @@ from omnibot_driver.core.fejemis.board import FejemisBoard
 from omnibot_driver.core.fejemis.services import Services
 from omnibot_driver.core.session import Session
 from omnibot_driver.qos import DEEP
+from omnibot_driver.services import ask
 
 WARN_EVERY_S: Final = 2.0
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
@@ -65,21 +66,13 @@ class FejemisCommands:
 
     def _service(self, job: Job) -> Callable[..., Any]:
         async def serve(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            answer = Future()
-
-            def ask(session: Session, now: float) -> None:
+            def begin(session: Session, answer: Future, now: float) -> None:
                 if why := _why_not_request(job.value, session):
                     raise RequestRefused(why)
                 cast(FejemisBoard, session.board).services.ask(job, answer, now)
 
-            try:
-                self._link.call(ask)
-            except RequestRefused as error:
-                response.success, response.message = False, str(error)
-                return response
-            done: JobDone = await answer
-            response.success, response.message = done.success, done.message
-            if done.success and job in BIASES:
+            await ask(self._link, begin, response)
+            if response.success and job in BIASES:
                 response.message += self._forget_bias(BIASES[job])
             return response
 

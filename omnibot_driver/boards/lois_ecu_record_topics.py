@@ -22,10 +22,10 @@ from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordComes, RecordFailed, RecordReading
-from omnibot_driver.core.requests import RequestDone
 from omnibot_driver.core.session import Session
 from omnibot_driver.files import CHECK_FOLDER
 from omnibot_driver.qos import DEEP
+from omnibot_driver.services import ask
 
 LONGEST_S: Final = 120.0
 NAMES: Final = {
@@ -63,9 +63,9 @@ class Recorder:
     async def _on_service(
         self, kind: RecordKind, _request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
-        answer, samples = Future(), int(self._values()["record_samples"])
+        samples = int(self._values()["record_samples"])
 
-        def begin(session: Session, now: float) -> None:
+        def begin(session: Session, answer: Future, now: float) -> None:
             session.begin_task(NAMES[kind], answer, LONGEST_S, now)
             try:
                 cast(LoisEcuBoard, session.board).record(kind, samples)
@@ -73,14 +73,8 @@ class Recorder:
                 session.end_task(answer, False, str(error))
             self._token = answer
 
-        try:
-            self._link.call(begin)
-        except RequestRefused as error:
-            response.success, response.message = False, str(error)
-            return response
-        done: RequestDone = await answer
-        response.success, response.message = done.success, done.message
-        return response
+        answered: Trigger.Response = await ask(self._link, begin, response)
+        return answered
 
     def _on_failed(self, failed: RecordFailed, _stamp_ns: int) -> None:
         self._end(self._token, False, f"the record failed: {failed.reason}")

@@ -296,7 +296,7 @@ def test_a_lookup_that_ends_after_an_answer_is_not_used(names: Names, named: Udp
     """
     names.wait_for(1, named)
     while named._name._looks_up:
-        time.sleep(0.001)
+        time.sleep(0.001)  # no event says that a lookup has ended
     named._name.heard()
     named._name._left = True  # the lookup ends now
     names.gate.clear()
