@@ -36,7 +36,7 @@ RAN_TWICE: Final = (
 CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: "
 )
-STUCK: Final = "one wheel may be stuck or slip, so the heading is uncertain"
+SLIPS: Final = "one wheel may be stuck or slip, so the heading is uncertain"
 OPPOSITE: Final = "the directions are opposite; check `heading_inverted` and `encoder_inverted`"
 WRONG_WAY: Final = (
     "the right wheel turned against the direction of a controlled move: check `encoder_inverted`,"
@@ -173,7 +173,7 @@ class Moves(Asking):
             if wrong_rad and not self.conversation.disturbed(now):
                 spun_rad = self.odometry.turn.spun_rad
                 told_rad = spun_rad - wrong_rad
-                why = STUCK if is_of_another(told_rad + spun_rad, spun_rad) else OPPOSITE
+                why = SLIPS if is_of_another(told_rad + spun_rad, spun_rad) else OPPOSITE
                 angles = math.degrees(told_rad), math.degrees(spun_rad)
                 self._notice(CONTRADICTED.format(*angles) + why, halt=False)
             return
@@ -251,7 +251,7 @@ class Moves(Asking):
         if self._move is not None:
             self._move.fail()
         asked_deg, seen_deg = math.degrees(done.asked), math.degrees(abs(done.turned_rad))
-        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + STUCK + DISCARDED, halt=True)
+        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + SLIPS + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
         """Discard the goal, because the network may have delivered its last move twice."""
