@@ -81,8 +81,8 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 ) -> None:
     """The motion monitor has stopped the robot. Motion is refused until the sender is silent.
 
-    A sender whose commands are refused because of a stall is not silent. So the driver also refuses
-    the sender's next command after the stall.
+    Then the computer stalls. The driver refuses the commands that arrive late, but they show that
+    the sender is not silent. So the driver also refuses the sender's next command after the stall.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -56,9 +56,8 @@ PARAMETERS: Final = table(
         },
         "odom_linear_scale": {
             "description": "True distance divided by the distance that odom shows while this"
-            " parameter is 1. The driver multiplies measured distances by this ratio. To"
-            " correct distances, the command `calibrate scale` finds metres_per_count, not this"
-            " parameter."
+            " parameter is 1. The driver multiplies measured distances by this ratio."
+            " Usually it stays 1, because `calibrate scale` corrects distances by metres_per_count."
         },
         "odom_angular_scale": {
             "description": "True angle of a turn divided by the angle that odom shows after the"

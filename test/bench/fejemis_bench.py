@@ -134,9 +134,10 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Measure the delays. Return an empty list of figures, and the rows of a table.
+    """Measure the delays. Return no figures, only the rows of a table.
 
-    The figures would compare the driver with a minimal program (the floor). The Fejemis has none.
+    For other boards, figures compare the driver with a minimal program (the floor). There is no
+    such program for the Fejemis.
     """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",

@@ -155,11 +155,12 @@ def test_operators_and_observers_may_read_all_commands(file: str) -> None:
 
 @pytest.mark.parametrize("file", ["omnibot", "fejemis"])
 def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> None:
-    """Each enclave may do what every node of rclpy does, under the name of its profile.
+    """A node of each enclave may offer the services that every rclpy node has.
 
-    The operator's tools may have any name. No other enclave may answer in the driver's name.
+    The node must have the name in its enclave's profile. Only the operator's tools may have any
+    name. So no enclave except the operator's may answer in the driver's name.
 
-    Bug: under SROS2, no node of these enclaves started, because each has parameter services.
+    Bug: under SROS2, no node of these enclaves could start: the policy allowed it no services.
     """
     for path, profile in profiles(POLICY.with_name(f"{file}.policy.xml")).items():
         name = "monitor_1" if path == "/omnibot/operator" else profile.attrib["node"]

@@ -55,9 +55,11 @@ second pose differs from the wheels' motion, and the way from the origin to the 
 most as long as the wheels' motion.
 """
 LONGEST_JUMP_S: Final = 0.2
-"""Time in s since the last accepted pose. If rejected poses contradict the wheel speeds within this
-time, the driver supposes that the origin moves again and again. Later, the driver trusts the poses,
-and not the wheel speeds."""
+"""Longest time in s since the last accepted pose in which the driver trusts the wheel speeds more.
+
+If poses contradict the wheel speeds within this time, the driver rejects them, and supposes that
+the origin moves again and again. Later, the driver trusts the poses, not the wheel speeds.
+"""
 
 
 class PoseOdometry:

@@ -77,7 +77,7 @@ class WheelModel:
 
     @property
     def unmeasured(self) -> bool:
-        """Whether a duty is set, and the public firmware does not measure this wheel's speed.
+        """Whether the public firmware does not measure this wheel's speed, because a duty is set.
 
         A stop is a duty too: the speed of a wheel that rolls out is not measured.
         """

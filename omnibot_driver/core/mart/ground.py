@@ -64,11 +64,12 @@ PRESENT_S: Final = 0.35
 The other part of this silence is ABSENT_TRIPS times the average duration of a query.
 """
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
-"""Limits in s for a short silence of a server at rest, in which it may have been restarted.
+"""Times in s for a short silence while the robot is at rest. The server may have been restarted.
 
-``GAP_S``: the silence lasts longer than this time plus twice the average duration of a query.
+``GAP_S``: a silence counts if it is longer than this time plus twice the average duration of a
+query.
 
-``GAP_LONGEST_S``: the driver waits at most this time for a heading after such a silence. A heading
+``GAP_LONGEST_S``: after such a silence, the driver waits at most this time for a heading. A heading
 of exactly zero shows a restart.
 """
 ABSENT_BUSY_S: Final = 2.5

@@ -26,8 +26,9 @@ class Quirks:
     * ``duty_drags_target``: while a negative duty is commanded, and the RPM target is not positive,
       each encoder tick lowers this target by 1. Requires ``ticks_of_forward_targets``.
     * ``reverse_runs_fast``: while the controller's duty is negative, and the RPM target is not
-      positive, each encoder tick lowers this target by 1. The controller's next step uses the lower
-      target, then restores the target. Requires ``ticks_of_forward_targets``.
+      positive, each encoder tick lowers this target by 1, until the controller's next step. This
+      step uses the lower target, and then sets the target to the commanded value. Requires
+      ``ticks_of_forward_targets``.
     * ``low_pass_starts_at_zero``: wheels ignore RPM targets until 0x23 is written.
     * ``extra_settings``: the settings 0x21 to 0x23 exist.
     * ``appends_odometry``: 0x12 sends the odometry after the ticks, with command number 0x12.
@@ -41,8 +42,8 @@ class Quirks:
       left wheel's correction factor for short levels to zero.
     * ``terminal_mixes_sensors``: each terminal mode forwards both sensors, character by character.
     * ``reset_clears_ticks_only``: 0x18 keeps the odometry and the set-points.
-    * ``terminal_passes_input_on``: in a terminal mode, input first goes to the sensor, at 9600 or
-      4800 baud.
+    * ``terminal_passes_input_on``: in a terminal mode, the board sends its input on to the sensor,
+      at 9600 or 4800 baud, before it evaluates the input.
     * ``headings_average_over_north``: the mean heading of 359, 1 and 1 is 120.
     * ``records_in_100_us``: the samples of an RPM record are in 100 µs, not in 100 ns.
     * ``torque_comes_as_rpm``: the reply to 0x17 has command number 0x04.

@@ -34,8 +34,8 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 def test_every_angle_is_told_within_half_a_degree() -> None:
     """Every relayed angle is right within 0.5°, and usually rounded to 0.1°.
 
-    If the checksum could miss damage to the line with this angle, the driver writes a safer angle
-    near it.
+    The text of some angles could be damaged in a way that the checksum does not show. The driver
+    writes a safer angle near such an angle.
     """
     told = [float(relayed(angle_deg)[4:]) for angle_deg in EVERY]
     assert max(map(abs, told)) == 90.0

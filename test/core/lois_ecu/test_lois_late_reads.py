@@ -258,7 +258,7 @@ def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
 ) -> None:
     """The driver stalls while a wheel rolls backward. The public firmware then counts no ticks.
 
-    The covariance describes the error of the estimated position, in each phase of the board's
+    After the stall, the error of the position fits the covariance, in each phase of the board's
     timers.
     """
     assert_described(stalled_drives(firmware, stall_s, twist))

@@ -37,8 +37,8 @@ def error_deg(bench: MartBench) -> float:
 def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -> None:
     """A gyro measures 95 % of each turn, and the scale is set to 1/0.95.
 
-    The heading is right after a curve of 230°, a turn on the spot of 340° and a goal. The first
-    turn of the goal turns the robot by 160°, so it brings the robot to the goal at once.
+    The heading is right after a curve of 230°, a turn on the spot of 340° and a goal. The goal
+    requires a turn of 160°. The first turn already has this angle, so no second turn is necessary.
     """
     bench = bench_with_poor_gyro(firmware)
     bench.command(0.2, 0.4, 10.0)

@@ -215,12 +215,12 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 
 @pytest.mark.parametrize("number", range(3))
 def test_a_lost_reply_does_not_make_a_stop_look_like_a_restart(number: int) -> None:
-    """The network has just lost a reply. A drive is stopped as soon as the wheels turn.
+    """The network loses a reply to a query. Then a drive is stopped as soon as the wheels turn.
 
-    The server answers the start with ``ok``, the stop with ``ok``, and the repeated stop with "no
-    motion". The driver has received the two ``ok`` replies, and the network has not duplicated any
-    reply. So "no motion" is not a sign of a restart, and the driver does not switch the motors off
-    by MCS.
+    The server answers the start with ``ok``, and the stop with ``ok``. The driver repeats the stop,
+    and the server answers with "no motion". The driver knows that the stop is answered, because it
+    has received two ``ok`` replies, and the network duplicates none. So "no motion" is not a sign
+    of a restart, and the driver does not switch the motors off by MCS.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 1.0)
