@@ -25,12 +25,13 @@ UNTIL_IT_MOVES: Final = (
 )
 UNTIL_START: Final = (
     "the front wheel did not go where it was commanded, for the second time within 60 s; check the"
-    " servo and its power (in reverse, set `allow_reverse` to false), then call ~/start"
+    " servo and its power. If the robot was driving backward, set `allow_reverse` to false. Then"
+    " call ~/start"
 )
 
 
 class Follower:
-    """The check of the front wheel.
+    """Checks that the front wheel follows its commanded angle, and otherwise refuses motion.
 
     ``refusal``: why the robot must not be driven; empty if driving is allowed.
     """
