@@ -47,9 +47,10 @@ PARAMETERS: Final = table(
     ),
     changed={
         "max_wheel_speed": {
-            "description": "Largest wheel rate that the driver commands for wheel_cmd, and in"
-            " drive_mode duty also for duty_cmd (by duty_scale). If one wheel exceeds it, both"
-            " wheels are slowed down in the same ratio."
+            "description": "Largest wheel rate that the driver commands for wheel_cmd. If one"
+            " wheel exceeds this limit, both wheels are slowed down in the same ratio. In"
+            " drive_mode duty, the limit also applies to duty_cmd: the driver converts each duty to"
+            " a wheel rate with duty_scale."
         }
     },
     checks=(

@@ -61,9 +61,9 @@ PARAMETERS: Final = table(
         },
         "odom_angular_scale": {
             "description": "True angle of a turn divided by the angle that odom shows after the"
-            " turn while this parameter is 1. The driver multiplies the angles of the controller's"
-            " gyro by this ratio. The parameter track corrects the angles that only the right"
-            " wheel measures."
+            " turn. To measure this ratio, set this parameter to 1. The driver multiplies the"
+            " angles of the controller's gyro by this ratio. During a turn on the spot, odom takes"
+            " the angle from the right wheel; the parameter track corrects that angle."
         },
         "port": {
             "default": "udp://192.168.1.50:5000",
