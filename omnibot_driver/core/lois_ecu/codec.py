@@ -178,7 +178,7 @@ def encode_report(report: Report) -> bytes:
         case Record():
             return _encode_record(report)
         case LostRecord():
-            raise FrameError("a lost record has no samples to send")
+            raise FrameError("a LostRecord cannot be encoded: its samples are lost")
         case TerminalLine(text):
             return text.encode("latin-1") + b"\r\n"
 
