@@ -20,10 +20,10 @@ MOST_OWED: Final = 0.5
 """Largest rounding error, in degrees, that is carried over to the next angle."""
 LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
-"""Limit in degrees for an angle to the left that the board misreads.
+"""Limit, in degrees, for the angle to the left that the board may read by mistake.
 
-If an angle to the right loses its minus sign unnoticed, the board reads an angle to the left. The
-driver writes each angle so that the misread angle is below this limit.
+If damage to the line removes the minus sign of an angle to the right unnoticed, the board reads an
+angle to the left. The driver writes each angle so that this mistaken angle is below the limit.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

@@ -58,7 +58,7 @@ class FejemisBoard(Board):
 
     @property
     def traits(self) -> Traits:  # type: ignore[override]
-        """The robot's traits; each channel has the name of the board that was found at its port."""
+        """The robot's traits, which name each port after the board that was found at this port."""
         return self._ports.traits
 
     @property
@@ -133,7 +133,7 @@ class FejemisBoard(Board):
     # Inbound
 
     def connect(self) -> None:
-        """Begin new connections: switch brush and lift off, and configure both boards again."""
+        """Begin new connections: switch off the brush and the lift, and configure both boards."""
         self._now = -math.inf
         self._ports.begin(self._settings)
         self._translation.connect()
@@ -171,10 +171,10 @@ class FejemisBoard(Board):
         self._upkeep.machine.off()
 
     def stalled(self) -> None:
-        """Switch brush and lift off after a stall of the driver.
+        """Switch off the brush and the lift, because the driver has stalled.
 
-        The guard may have switched them off already. The stall is not regarded as silence of the
-        boards.
+        The guard may have switched off the brush and the lift already. The stall is not regarded as
+        silence of the boards.
         """
         self._inbound.watch.stalled()
         for half in self._ports.halves:
@@ -184,7 +184,7 @@ class FejemisBoard(Board):
             self._upkeep.machine.off()
 
     def leave(self) -> None:
-        """Switch brush and lift off at once, and end the running job, because the driver ends.
+        """Switch off the brush and the lift, and end the running job, because the driver ends.
 
         This method does not wait until the wheels have stopped.
         """
@@ -231,10 +231,10 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Latch or release the board's e-stop after a new order of the driver.
+        """Latch or release the e-stop, according to a new order of the driver.
 
-        ``estop``: whether the order is an emergency stop, which latches the e-stop. Any other order
-        releases it.
+        ``estop``: whether the order is an emergency stop. An emergency stop latches the e-stop, and
+        switches off the brush and the lift. Any other order releases the e-stop.
         """
         if not estop:
             self._obedience.release(self._now)
@@ -245,7 +245,10 @@ class FejemisBoard(Board):
             self._upkeep.jobs.interrupt(why)
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """Return the packets that send one line to each board."""
+        """Return the packets that send one motion line to each of the two boards.
+
+        ``drive``: the line for the drive board. ``front``: the line for the front board.
+        """
         return self._ports.line("drive", drive) + self._ports.line("front", front)
 
     def stop(self) -> Packets:
@@ -253,9 +256,9 @@ class FejemisBoard(Board):
         return self._ports.both(STOP)
 
     def emergency_stop(self) -> Packets:
-        """Return ``stop`` for the drive board, and the lines that switch brush and lift off.
+        """Return ``stop`` for the drive board, and lines that switch off the brush and the lift.
 
-        Brush and lift belong to the front board, which does not know the command ``stop``.
+        The brush and the lift belong to the front board, which does not know the command ``stop``.
         """
         return self._ports.ending("drive", b"stop") + self._all_off()
 
@@ -263,14 +266,15 @@ class FejemisBoard(Board):
         return self._ports.ending("front", *OFF)
 
     def switch_off(self) -> Packets:
-        """Return lines that switch brush and lift off.
+        """Return lines that switch off the brush and the lift.
 
-        The lines also let the front board show its own lights again.
+        If the user has set the colour of the LED strip, the lines also end this colour: the front
+        board shows its own lights again.
         """
         return self._ports.ending("front", *self._upkeep.machine.switch_off())
 
     def wake(self) -> Packets:
-        """Return a Stop for both boards, and the lines that switch lift and brush off."""
+        """Return a Stop for both boards, and the lines that switch off the lift and the brush."""
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:

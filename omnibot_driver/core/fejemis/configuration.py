@@ -39,9 +39,10 @@ DIGIT: Final = 6e-4
 The larger one applies, because the board prints few digits.
 """
 HALF: Final = 0.51
-"""Largest tolerance for a number that the board reports back, in units of its last printed digit:
-0.5 for rounding, and 0.01 for single precision. While the number of digits is unknown, only
-``NEAR`` and ``DIGIT`` limit the tolerance.
+"""Limit for the tolerance of a number that the board reports back, in units of its last digit.
+
+The limit is the sum of 0.5 for rounding and 0.01 for single precision. While the number of printed
+digits is unknown, there is no such limit, and the tolerance is that of ``NEAR`` and ``DIGIT``.
 """
 
 
@@ -70,7 +71,10 @@ class Configuration:
         self.begin()
 
     def begin(self) -> None:
-        """Read all numbers and write all settings again; the board may have lost them."""
+        """Read the whole configuration of the board again, and write all settings again.
+
+        The board may have lost the settings.
+        """
         self.told.clear()
         self._once.clear()
         self._next_at = -math.inf

@@ -17,8 +17,11 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""How many heartbeats in a row must contradict ``sums`` before ``sums`` changes. While ``sums`` is
-unknown, one heartbeat decides.
+"""Number of heartbeats in a row that must contradict ``sums`` before the decoder changes ``sums``.
+
+``sums`` says whether the board's lines have checksums. A heartbeat with a checksum contradicts the
+value False; a heartbeat without a checksum contradicts True. While ``sums`` is unknown, one
+heartbeat decides.
 """
 
 
@@ -38,10 +41,11 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: whether the last line other than a heartbeat contradicts ``sums``, if
-      ``line_sums`` is auto. While this is true, the driver's lines to the board have no checksum.
-    * ``contradicted``: whether the last line contradicts ``line_sums``, if this setting is on or
-      off.
+    * ``doubtful``: whether the last line contradicts ``sums``. A heartbeat does not set this flag.
+      The flag is used only if the user's setting ``line_sums`` is auto. While the flag is True, the
+      driver's lines to the board have no checksum.
+    * ``contradicted``: whether the last line contradicts ``line_sums``. This flag is used only if
+      ``line_sums`` is on or off.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -37,7 +37,7 @@ REVERSE = (
 
 
 class Pair(Protocol):
-    """What the encoder needs from the two boards."""
+    """The two boards of the robot, with the properties and methods that ``Encoder`` needs."""
 
     @property
     def geometry(self) -> Geometry:
@@ -54,7 +54,10 @@ class Pair(Protocol):
         """Return the packets of the boards' own emergency stop."""
 
     def motion(self, drive: bytes, front: bytes) -> Packets:
-        """Return the packets that send one line to each board."""
+        """Return the packets that send one motion line to each of the two boards.
+
+        ``drive``: the line for the drive board. ``front``: the line for the front board.
+        """
 
     @property
     def with_sums(self) -> bool:
@@ -65,7 +68,7 @@ class Pair(Protocol):
 
 
 class Encoder:
-    """Encoder of orders.
+    """Converts each motion order into packets for both boards.
 
     ``held``: whether the speed is limited because the front wheel has not reached its angle.
     """
@@ -77,7 +80,7 @@ class Encoder:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the last order; no motion is commanded from now on."""
+        """Forget the last order. Until the next order, no motion is commanded."""
         self.held = self._turning = False
         self._encoded: tuple[Packets, Steered] | None = None
         self.follower.begin()
@@ -86,8 +89,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        This is necessary in two cases. The angle limits the speed, so each new angle changes the
-        limit. Or the lines have no checksums, so a damaged line must soon be replaced.
+        True if the angle limits the speed, because each new angle changes this limit. Also True if
+        the lines have no checksums, because the board may obey a damaged line until the next line.
         """
         return self.held or not self._pair.with_sums
 
@@ -113,7 +116,8 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the twist of the robot's body that the sent ``packets`` command.
 
-        Only the first call with the packets of the last ``encode`` returns a motion.
+        Call this method once after each ``encode``, with the returned packets. Without a preceding
+        ``encode``, or with other packets, the method returns a standstill.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -11,10 +11,11 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""Number of lines, among 24 of one kind, that differ from the learnt form when its check ends.
+"""Limits for the number of lines, among 24 of one kind, that differ from the learnt form.
 
-Afterwards, every form of this kind is accepted. ``VARIES``: for lines with a correct checksum;
-``VARIES_WITHOUT_SUM``: for other lines.
+When the number reaches its limit, the driver stops the check of this kind of line, and accepts
+every form. ``VARIES`` is the limit for lines with a correct checksum, ``VARIES_WITHOUT_SUM`` the
+limit for other lines.
 """
 OF: Final = 24
 

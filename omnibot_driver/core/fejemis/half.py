@@ -119,8 +119,8 @@ class Half:
     def unsure(self) -> bool:
         """Whether the board may have restarted and lost the user's settings.
 
-        It becomes True when the lines that driving requires are missing, and False when the next
-        heartbeat comes.
+        The value becomes True when the data stream that driving requires stops, and False with the
+        next heartbeat.
         """
         return self._unsure_at is not None
 
@@ -212,9 +212,10 @@ class Half:
         return [lines[key].encode("ascii") for key in wanted]
 
     def _is_slow(self, now: float) -> bool:
-        """Return whether the stream that driving requires is much slower than its subscription.
+        """Return whether the data stream that driving requires is much slower than requested.
 
-        Two calls in a row must find too few lines, because lines may wait to be read.
+        True only if this call and the previous call have found too few lines. After a single such
+        call, lines may still wait to be read.
         """
         assert self.role is not None
         count, since = self._needed, self._needed_since

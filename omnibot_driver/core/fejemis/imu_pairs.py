@@ -23,14 +23,16 @@ PERIOD_S: Final = 0.01
 # lines are missing since the previous pose. One kind of false pair remains undetected: both lines
 # are late, but close together, and no later pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
-"""Limit in s for the time between the two lines of a pair. If the time reaches this limit, the pair
-may be false, so it must wait for the next pose.
+"""Limit, in s, for the time between a gyro line and an acceleration line that form a pair.
+
+If the time reaches this limit, the two lines may belong to different samples. Such a pair is used
+only if the next pose shows that no lines are missing.
 """
 SILENT_S: Final = 0.1
-"""Longest usual time, in s, without gyro and acceleration lines.
+"""Limit, in s, for a time without gyro and acceleration lines.
 
-After a longer time, new pairs wait for the next pose. They are rejected if the pose shows that
-lines are missing.
+After a longer time, lines may be missing, so new pairs of lines wait for the next pose. If the pose
+shows that lines are missing, these pairs are rejected.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver in which new pairs must wait for the next pose: the
@@ -38,10 +40,11 @@ kernel's buffer may have overflowed and lost lines.
 """
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""The sign of the sum ``_evidence_s`` shows which line of a sample comes first.
+"""Limits, in s, for the magnitude of the sum ``_evidence_s``, a difference of time intervals.
 
-``KNOWN_S``: smallest magnitude of the sum, in s, from which the sign is used. ``SUREST_S``: largest
-magnitude of the sum, in s.
+The sign of the sum shows whether the gyro line or the acceleration line of a sample comes first.
+``KNOWN_S``: smallest magnitude from which the sign is used. ``SUREST_S``: the sum is limited to
+this magnitude.
 """
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to the interval between a gyro and an acceleration line if another line
@@ -52,10 +55,15 @@ PATIENCE: Final = 60
 the magnitude of ``_evidence_s`` is still below ``KNOWN_S``.
 """
 MOST: Final = 10
-"""Largest magnitude of a counter in ``_outside``."""
+"""Limit for the magnitude of each counter in ``_outside``. At this limit, a counter stops.
+
+The sign of a counter shows whether a kind of line comes between pairs or within a pair.
+"""
 UNPOSED: Final = 20
-"""Largest number of gyro lines, or of acceleration lines, after the last pose, for which a doubtful
-pair waits for the next pose. With more lines, the pair is rejected.
+"""Limit for the number of gyro or acceleration lines for which a doubtful pair waits for a pose.
+
+If more gyro lines, or more acceleration lines, have arrived since the last pose, the pair is
+rejected.
 """
 
 
@@ -113,8 +121,9 @@ class ImuPairs:
         self._skipped = 0
         self._silent = False
         """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines.
-        New pairs are then doubtful until the next pose, or until ``take`` rejects a pair because no
-        pose comes.
+
+        If True, lines may be missing, so each new pair is doubtful. The next pose resets this flag.
+        If no pose comes, ``take`` resets the flag when it rejects a doubtful pair.
         """
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
@@ -137,8 +146,9 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line. ``kind``: its keyword.
 
-        If a pair still waits for its second line, the second line is now regarded as lost. If lines
-        of this ``kind`` usually come within a pair, the pair waits on.
+        If a pair waits for its second line at this moment, ``kind`` decides. If lines of this kind
+        usually come within a pair, the pair waits on. Otherwise, the second line is regarded as
+        lost.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -246,9 +256,11 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Count lines, to learn whether a kind of line comes between pairs or within a pair.
+        """Count where lines come: between two pairs, or within a pair.
 
-        ``step``: 1 for ``kinds`` that came between two pairs, -1 for those within a pair.
+        The counters show where each kind of line usually comes. ``kinds``: kinds of lines that have
+        come. ``step``: number to add to the counters of these kinds: 1 if the lines came between
+        two pairs, -1 if they came within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))

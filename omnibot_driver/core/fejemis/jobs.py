@@ -37,9 +37,9 @@ CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s. For about a second of it, the board averages its readings."""
 AGAIN_S: Final = 0.4
 SAID: Final = 3
-"""How many times the driver sends the command of a job.
+"""Number of times that the driver sends the command of a job, except a calibration.
 
-For a calibration, CALIBRATIONS is the limit.
+For a calibration, ``CALIBRATIONS`` is the largest number.
 """
 UNCHANGED_S: Final = 2.4
 """Time limit in s for a change of the offsets after a command to calibrate.

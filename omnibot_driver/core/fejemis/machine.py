@@ -98,22 +98,23 @@ class Machine:
         self._led_at = max(now, self._led_again_at)
 
     def begin(self) -> None:
-        """Switch brush and lift off, and send the colour again, because a board has restarted."""
+        """Switch off the brush and the lift, and send the colour again: a board has restarted."""
         self.off()
         if self.colour is not None:
             self._led_left, self._led_at = TIMES, -math.inf
 
     def off(self) -> None:
-        """Switch brush and lift off."""
+        """Switch off the brush and the lift."""
         self.brush, self.volts = False, 0.0
         self._lift_line = b""
         self._off_left, self._brush_left = TIMES, 0
         self._next_at = -math.inf
 
     def switch_off(self) -> list[bytes]:
-        """Switch brush and lift off, and return the lines that do this.
+        """Switch off the brush and the lift, and return the lines that do this.
 
-        The lines also let the board show its own lights again.
+        If the user has set the colour of the LED strip, the lines also end this colour: the board
+        shows its own lights again.
         """
         self.off()
         lights = [b"ledon 1", b"leds"] if self.colour else []

@@ -139,7 +139,10 @@ class WheelConfiguration:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """All numbers that the driver can write to the board: all except the control period."""
+        """The numbers of this line that the driver can write to the board.
+
+        The control period is left out, because the driver cannot write it.
+        """
         return (
             self.left_radius_m,
             self.right_radius_m,

@@ -19,8 +19,9 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Speed in a curve, in m/s, below which the front board gets the speed 0. For slower speeds, hardly
-any number stays harmless if the line is damaged.
+"""Limit for the speed in a curve, in m/s. Below this limit, the front board gets the speed 0.
+
+Among smaller speeds, there is hardly any whose text stays harmless if the line is damaged.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
@@ -76,9 +77,10 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 
 @lru_cache(maxsize=512)
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the drive board's line. The outer wheel's speed is sqrt(speed² + turn²) in m/s.
+    """Return the drive board's line for a speed in m/s and a turn rate in rad/s.
 
-    The wheel's direction is the sign of ``speed_mps``.
+    The board drives the outer wheel with the speed sqrt(speed² + turn rate²), in m/s. The sign of
+    ``speed_mps`` gives the direction of the outer wheel.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
@@ -126,9 +128,10 @@ def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the cheapest line whose checksum would reveal damage, or else the cheapest line.
+    """Return the line with the lowest cost among the lines whose checksum reveals damage.
 
-    ``signs``: the signs of speed and turn rate, as text.
+    If there is no such line, return the line with the lowest cost of all. The cost shows how much a
+    line deviates from the commanded motion. ``signs``: the signs of speed and turn rate, as text.
     """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)

@@ -14,8 +14,10 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: powers of ten that limit the size of a safe number. The number is at
-least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``.
+"""``SMALLEST``, ``LARGEST``: powers of ten that limit the size of a safe number.
+
+A safe number is at least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``. The checksum of a
+line with safe numbers detects the loss of any two characters.
 """
 
 
@@ -23,7 +25,9 @@ least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``.
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all safe numbers in rising order, and the text of each number.
 
-    ``negative``: whether the line contains a minus sign; its numbers then contain no ``6``.
+    The checksum of a line with safe numbers detects the loss of any two characters. ``negative``:
+    whether the line contains a minus sign. If True, the numbers contain no ``6``, because the
+    checksum does not detect the loss of ``-`` and ``6``.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.
@@ -41,7 +45,10 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool) -> tuple[float, str]:
-    """Return the safe number (``numerals``) nearest to a positive ``number``, with its text."""
+    """Return the safe number nearest to a positive ``number``, and the text of the safe number.
+
+    The checksum of a line with safe numbers detects the loss of any two characters.
+    """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
     if at == len(numbers) or (at > 0 and number - numbers[at - 1] < numbers[at] - number):
@@ -50,7 +57,10 @@ def nearest(number: float, *, negative: bool) -> tuple[float, str]:
 
 
 def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the safe numbers (``numerals``) next to ``number``, below and above, with texts."""
+    """Return the safe numbers just below and just above ``number``, each with its text.
+
+    The checksum of a line with safe numbers detects the loss of any two characters.
+    """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
     part = slice(max(0, at - 1), at + 1)
@@ -58,7 +68,10 @@ def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
 
 
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the safe numbers (``numerals``) from ``least`` to ``most``, with their texts."""
+    """Return the safe numbers from ``least`` to ``most``, each with its text.
+
+    The checksum of a line with safe numbers detects the loss of any two characters.
+    """
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))
     return list(zip(numbers[part], texts[part], strict=True))

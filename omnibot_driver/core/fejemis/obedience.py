@@ -67,9 +67,10 @@ class Obedience:
         self.start_at = math.inf
 
     def release(self, now: float) -> None:
-        """Release the driver's e-stop. ``start`` becomes due if the board obeyed before the e-stop.
+        """Release the driver's e-stop.
 
-        If the user has requested a pause, ``start`` does not become due.
+        If the drive board obeyed motion commands before the e-stop, and the user has not requested
+        a pause, ``start`` becomes due.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf

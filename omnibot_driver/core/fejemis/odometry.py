@@ -45,20 +45,27 @@ NEW_FRAME: Final = 4
 Each of these poses must agree with the rejected pose just before it.
 """
 MOVED_FRAME: Final = 2
-"""Number that replaces ``NEW_FRAME`` if the wheel speeds explain the motion between the rejected
-poses."""
+"""Number of rejected poses in a row that prove a new coordinate frame if the wheel speeds agree.
+
+Each of these poses must agree with the rejected pose just before it, and the wheel speeds must
+explain the motion between the two poses. Without agreement of the wheel speeds, ``NEW_FRAME`` poses
+are necessary.
+"""
 AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
-"""``AGAIN_M``, ``AGAIN_RAD``: tolerances in m and rad. With them, the driver finds out whether the
-origin has moved again between two rejected poses. If it has, the motion from the first to the
-second pose differs from the wheels' motion, and the way from the origin to the second pose is at
-most as long as the wheels' motion.
+"""``AGAIN_M``, ``AGAIN_RAD``: tolerances, in m and rad, between poses and the wheels' motion.
+
+With these tolerances, the driver decides whether the origin may have moved again between two
+rejected poses. Two conditions must be true. First, the motion from the first to the second pose
+differs from the wheels' motion by more than a tolerance. Second, the way from the origin to the
+second pose is at most as long as the wheels' motion plus the tolerances.
 """
 LONGEST_JUMP_S: Final = 0.2
-"""Longest time in s since the last accepted pose in which the driver trusts the wheel speeds more.
+"""Longest time, in s, for which the driver trusts the wheel speeds more than the poses.
 
-If poses contradict the wheel speeds within this time, the driver rejects them, and supposes that
-the origin moves again and again. Later, the driver trusts the poses, not the wheel speeds.
+The time begins with the last accepted pose. In this time, the driver rejects poses that contradict
+the wheel speeds, because the origin of the poses may be moving again and again. After this time,
+the driver trusts the poses, not the wheel speeds.
 """
 
 
@@ -76,8 +83,10 @@ class PoseOdometry:
         self._told = Pose()
         self._restarted = False
         self._moved = False
-        """Whether the last displacement ended in a new coordinate frame, which the next PoseReading
-        must report."""
+        """Whether the last displacement ended in a new coordinate frame of the board.
+
+        The next PoseReading must report the new frame.
+        """
         self._settled_s = -math.inf
         self.begin()
 
@@ -91,22 +100,25 @@ class PoseOdometry:
         """How often in a row a rejected pose has agreed with the pose before it, which was
         rejected, too."""
         self._driven: Pose | None = None
-        """Motion from the last accepted pose to the last rejected one, or None.
+        """Motion from the last accepted pose to the last rejected pose; None while it is unknown.
 
-        The motion to the first rejected pose is computed from wheel speeds. The motion from one
-        rejected pose to the next is the difference of the two poses. If the wheel speeds show that
-        the coordinate frame may have moved again, this motion is computed from the wheel speeds.
+        The motion to the first rejected pose is computed from the wheel speeds. For each further
+        rejected pose, the motion from the rejected pose just before is added: the difference of the
+        two poses. If the wheel speeds show that the coordinate frame may have moved between the two
+        poses, the motion by the wheel speeds is added instead.
 
-        If the value is not None, the rejected poses may be in a new coordinate frame: the wheel
-        speeds are known for this whole time, and they contradict the first rejected pose.
+        If the value is not None, the wheel speeds contradict the first rejected pose, so the
+        rejected poses may be in a new coordinate frame.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
         self._speeds_s = self._time_s = -math.inf
         self._speeds_new = False
-        """Whether the last wheel speeds still wait for the next pose. ``_speeds_s``: board time, in
-        s, of the first pose that arrived after wheel speeds. ``_time_s``: board time of the last
-        pose, in s."""
+        """Whether wheel speeds have arrived since the last pose.
+
+        ``_speeds_s``: board time of the last wheel speeds, in s. Wheel speeds get the time of the
+        first pose that arrives after them. ``_time_s``: board time of the last pose, in s.
+        """
 
     @property
     def moving(self) -> bool:
@@ -127,10 +139,11 @@ class PoseOdometry:
         self._before, self._speeds, self._speeds_new = self._speeds, speeds, True
 
     def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
-        """Return a list with the displacement from the previous pose; empty if there is none.
+        """Return a list with the displacement from the previous pose; empty without a displacement.
 
-        Every 0.2 s, and when a new coordinate frame begins, the list also contains a PoseReading.
-        It is the sum of the first pose of the frame and all displacements returned since then.
+        There is no displacement if ``pose`` is the first one, or is rejected. Every 0.2 s, and when
+        a new coordinate frame begins, the list also contains a PoseReading: the sum of the frame's
+        first pose and all displacements returned in this frame.
         """
         displacement = self.pose(pose)
         if displacement is None:
@@ -212,11 +225,14 @@ class PoseOdometry:
         )
 
     def _driven_to(self, pose: BoardPose, since_s: float) -> Pose | None:
-        """Return the motion from the last accepted pose to this rejected one, by the wheel speeds.
+        """Return the motion from the last accepted pose to ``pose``, by the wheel speeds.
 
-        None if the speeds are unknown. Also None if the pose may have been rejected only because
-        of rounding: such a pose does not show a new coordinate frame. ``since_s``: time in s since
-        the last accepted pose.
+        ``pose``: the first rejected pose after the accepted one. ``since_s``: time in s since the
+        accepted pose.
+
+        Return None if the wheel speeds are unknown. Also return None if the poses are rounded so
+        coarsely that rounding may explain the rejection: such a pose does not show a new coordinate
+        frame.
         """
         assert self._pose is not None
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)

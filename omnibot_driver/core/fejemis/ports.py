@@ -35,7 +35,7 @@ class Ports:
 
     @property
     def traits(self) -> Traits:
-        """The robot's traits. Each channel is named after the board that was found at its port."""
+        """The robot's traits, which name each port after the board that was found at this port."""
         return SWAPPED if self.swapped else TRAITS
 
     def begin(self, settings: FejemisSettings) -> None:
@@ -114,7 +114,9 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        If its port is unknown, the lines go to each port without a known role, or else to both.
+        If the port of this board is unknown, the lines go to each port at which no board is known
+        yet. If both ports have known boards, but neither board has this role, the lines go to both
+        ports.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

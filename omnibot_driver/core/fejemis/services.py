@@ -58,9 +58,10 @@ class Services:
         self._upkeep.machine.set_brush(on)
 
     def lift(self, volts: float, now: float) -> None:
-        """Move the lift for at most ``command_timeout_s``; positive volts raise the front wheel.
+        """Move the lift, which can raise the front wheel, for at most ``command_timeout_s``.
 
-        Raises CommandRefused for NaN or infinity, or if the lift must not run now.
+        Positive volts raise the front wheel. Raises CommandRefused for NaN or infinity, or if the
+        lift must not run now.
         """
         if volts and (reason := self._why_not_turn()):
             raise CommandRefused(f"lift_cmd refused: {reason}")

@@ -30,7 +30,10 @@ def with_sum(text: bytes) -> bytes:
 
 
 def without_sum(line: bytes) -> tuple[bytes, bool | None]:
-    """Return a line's text, and whether its checksum is right; None if the line has no checksum."""
+    """Return a line's text, and whether the line's checksum is right.
+
+    The second item is None if the line has no checksum.
+    """
     if not line.startswith(b";"):
         return line, None
     found = _SUMMED(line)

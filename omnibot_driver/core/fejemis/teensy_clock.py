@@ -14,9 +14,9 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest time in s by which a line may seem to arrive early.
+"""Longest time, in s, by which a line may seem to arrive before the board has sent it.
 
-If a line seems to arrive earlier than that, its board time is implausible.
+If a line seems to arrive even earlier, its board time is implausible.
 """
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
@@ -33,10 +33,10 @@ The clock begins anew if at least ``AGAIN`` implausible board times in a row agr
 ``AGAIN_AFTER_S``.
 """
 EARLIES_WITHIN_S: Final = 1.0
-"""Longest time in s from the first to the last of three lines that make the clock begin anew.
+"""Limit, in s, for the time from the first to the last of three lines that seem early.
 
-Three (``AGAIN``) lines that seem early, and whose times agree, show that the clock began with a
-late line.
+If a clock began with a line that arrived late, later lines seem to arrive early. So if three
+(``AGAIN``) lines seem early within this time, and their board times agree, the clock begins anew.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -67,8 +67,10 @@ class TeensyClock:
         ``_odd``: the first of these board times, and its time of arrival.
         """
         self._earlies: list[tuple[float, float]] = []
-        """Board times that seem early, by at most ``LATE_S``, each with its arrival time. All of
-        them agree.
+        """Board times of lines that seem to arrive early by the clock, each with its arrival time.
+
+        The lines are early by at most ``LATE_S``. The board times agree with each other: they
+        advance like the arrival times (``AGREE_S``).
         """
         self._last_s = 0.0
         self.connect()
@@ -147,9 +149,10 @@ class TeensyClock:
         return True
 
     def _began_late(self, board_s: float, now: float) -> bool:
-        """Begin the clock anew if enough lines seemed early and their times agree.
+        """Begin the clock anew if the clock began with a line that arrived late.
 
-        Return whether the clock has begun anew.
+        Three (``AGAIN``) lines show this: each line seems to arrive early by the clock, and the
+        board times of the lines agree with each other. Return whether the clock has begun anew.
         """
         agree = all(
             before_s < board_s
@@ -183,7 +186,10 @@ class StampedReadings:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the readings that were added before, because a new call of the board begins."""
+        """Discard the readings of the previous call of the board, because a new call begins.
+
+        A call of the board is a call of ``FejemisBoard.receive``, ``flush`` or ``elapse``.
+        """
         self.readings: list[Reading] = []
         self._stamps: list[float] = []
 

@@ -44,8 +44,10 @@ TESLA_PER_MICROTESLA: Final = 1e-6
 LOW_AGAIN_S: Final = 60.0
 """Shortest time in s between two notices of a low battery."""
 SAMPLE_WITHIN_S: Final = 0.03
-"""Age of the last IMU sample, in s, from which an orientation is discarded. Younger samples are
-published together with the orientation.
+"""Limit, in s, for the age of the last IMU sample when an orientation arrives.
+
+If the sample is younger, it is published together with the orientation. Otherwise, the orientation
+is discarded.
 """
 
 

@@ -44,7 +44,7 @@ class Upkeep:
             configuration.configure(settings.written)
 
     def begin(self) -> None:
-        """Begin anew after a connection: switch brush and lift off, and configure both boards."""
+        """Begin anew after a connection: switch off brush and lift, and configure both boards."""
         self.machine.off()
         self.jobs.begin()
         for role in ROLES:
