@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of the kind of board.
+"""Detection of the kind of board: with public firmware, or as the manual describes.
 
 * Public firmware: an odometry report follows each tick report, with the same command byte (0x12).
-  Ticks count only while a wheel is commanded forward.
-* Manual: odometry reports have the command byte 0x20. Ticks count in both directions.
+  The board counts ticks only while a wheel is commanded forward.
+* Manual: odometry reports have the command byte 0x20. The board counts ticks in both directions.
 """
 
 from typing import Final
@@ -14,9 +14,10 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports that must arrive before the driver can detect the manual's kind of board.
+"""Number of tick reports after which the driver can recognise a board as the manual describes.
 
-An odometry report with its own command byte (0x20) then shows this kind.
+After this number, an odometry report with the command byte 0x20 shows this kind of board. The
+public firmware sends odometry reports with the command byte of tick reports (0x12).
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
@@ -26,7 +27,8 @@ count decreases, the driver decides that the board does not count ticks backward
 class BoardKind:
     """The kind of one board. The detected properties are written into the motion filter ``motion``.
 
-    ``appends``: whether an odometry report (0x12) follows each tick report.
+    ``appends``: whether the board sends an odometry report directly after each tick report, with
+    the command byte of tick reports (0x12).
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -61,10 +63,10 @@ class BoardKind:
             motion.signed |= self._lone_ticks >= LONE_TICKS
 
     def watch(self, told: Told | None) -> None:
-        """Detect whether this board counts ticks only forward.
+        """Detect whether this board counts no ticks while a wheel rolls backward.
 
-        The board does if wheels roll backward for ``UNCOUNTED_M`` and no count has ever decreased.
-        ``told``: changes since the previous odometry report, or None.
+        The driver decides this if wheels roll backward for more than ``UNCOUNTED_M``, and no count
+        has ever decreased. ``told``: changes since the previous odometry report, or None.
         """
         if told is None or not self._motion.signed or self._seen_signed:
             return

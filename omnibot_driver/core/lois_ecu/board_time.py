@@ -22,8 +22,10 @@ the delay by 0.5 ms in this time.
 """
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
-"""Longest plausible delay in s. A longer delay means that the board has restarted, or that its
-clock has another unit."""
+"""Longest plausible delay, in s, from the board's time of a tick report to the driver's read.
+
+A longer delay means that the board has restarted, or that its clock has another unit.
+"""
 UNKNOWN_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, while the unit of the board's clock is
 unknown."""
@@ -32,8 +34,10 @@ SAME_READ_S: Final = 0.02
 """Tick reports that arrive within this time in s were probably read together, and late. Only
 the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
-"""Margin in s. A delay is irregular if the report is earlier than the fitted clock, or later than
-the largest recent delay, by more than this margin.
+"""Margin, in s, beyond which the delay of a tick report is irregular.
+
+A delay is irregular if it is below 0 by more than this margin, or exceeds the largest recent delay
+by more than this margin. Delays are measured from the fitted clock.
 """
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
@@ -54,8 +58,10 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """How far the board's clock has fallen behind since the first tick report, in s. First
-        value: if the clock always runs. Second value: if it stops while the board sends.
+        """Two values in s: how far the board's clock has fallen behind since the first tick report.
+
+        The first value assumes that the clock always runs (manual). The second value assumes that
+        the clock stops while the board sends (public firmware).
         """
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
@@ -84,8 +90,8 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s by the fitted clock, and whether it is irregular.
 
-        A late read does not explain an irregular delay. While too few reports are stored, return 0
-        and False. The report is not stored.
+        A late read does not explain an irregular delay. While too few reports are stored, the
+        result is 0 and False. This method never stores the report.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False
@@ -131,7 +137,10 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return how far each point is above the line of ``_line_below``, in s."""
+    """Return the delay of each stored tick report, in s.
+
+    The delay is the height of the report's point above the straight line from ``_line_below``.
+    """
     slope, least = _line_below(kept)
     return [behind_s - slope * at_s - least for at_s, behind_s in kept]
 

@@ -30,10 +30,11 @@ class Coasting:
     speed_mps: float
 
     def unsure_mps(self, now: float, step_s: float) -> float:
-        """Return the standard deviation of the speed at ``now``, with the sign of the speed.
+        """Return the speed's error at ``now``: one standard deviation, with the sign of the speed.
 
-        It is half the difference between the speeds of two assumed wheels. One decelerates fast
-        and at once, the other decelerates slowly and only after ``step_s``.
+        The standard deviation is half the difference between the speeds of two imagined wheels. The
+        first wheel decelerates fast, and begins at once. The second wheel decelerates slowly, and
+        begins only after ``step_s``, the period of the speed controller in s.
         """
         age_s = now - self.heard_s
         slow_mps = self._speed_after((1 + COAST_PART) * age_s)

@@ -36,8 +36,12 @@ of the tick report."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""``TICK_VARIANCE``: variance of the error of a tick count, in squared ticks. ``TURN_VARIANCE``,
-``ALONG_VARIANCE``: the same for the heading and the distance in the board's odometry (0x20).
+"""Variances of the errors of the board's reports, in squared ticks.
+
+* ``TICK_VARIANCE``: error of a tick count.
+* ``TURN_VARIANCE``: error of the heading in the board's odometry (0x20), as a difference of the
+  distances of the two wheels.
+* ``ALONG_VARIANCE``: error of the distance in the board's odometry (0x20).
 """
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
@@ -54,11 +58,11 @@ this number of ticks. Otherwise, the next tick may not be due yet.
 """
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""Limits for the difference between a reported and an expected value: ``LEAP`` in standard
-deviations, ``LEAP_M`` in m at the rims.
+"""Limits for the difference between a value in the board's odometry and the expected value.
 
-A heading beyond both limits is ignored, because it comes from an outdated wheel speed. A distance
-beyond ``LEAP`` is ignored too.
+``LEAP`` is in standard deviations, ``LEAP_M`` in m at the rims. A heading is ignored if its
+difference exceeds both limits: the board has computed such a heading from an outdated wheel speed.
+A distance is ignored if its difference exceeds ``LEAP``.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -67,9 +71,10 @@ SWINGING_M: Final = 0.055
 """Standard deviation, in m, of the error in a wheel's distance after 1 m without counted ticks:
 ``BLIND_M`` at a steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
-"""Standard deviation, in m, of an error of the robot's x and of its y, for each 1 m that a wheel
-rolls at an oscillating speed while the board counts no ticks of it. ``SWINGING_M`` is the error of
-the wheel's distance.
+"""Standard deviation, in m, of the errors of the robot's x and y after a wheel has rolled 1 m.
+
+These errors arise only while the wheel's speed oscillates and the board does not count the wheel's
+ticks. The error of the wheel's distance in this case is ``SWINGING_M``.
 """
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviation of the distance that a wheel rolled while reports were lost, as a fraction of
@@ -78,9 +83,10 @@ a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""``CORRECTED_TICKS``: an error remains after a wheel's distance was corrected by more than this
-number of ticks. ``CORRECTED_PART``: standard deviation of this error, as a fraction of the excess
-of the correction over ``CORRECTED_TICKS``. Only for a wheel without counted ticks.
+"""The error that remains after a large correction of the distance of a wheel without counted ticks.
+
+A correction is large if it exceeds ``CORRECTED_TICKS``, in ticks. The standard deviation of the
+error is the fraction ``CORRECTED_PART`` of the excess over ``CORRECTED_TICKS``.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -101,7 +107,10 @@ class Comparison:
         self._motion = motion
         self._counted_m = [0.0, 0.0]
         self._counted = [False, False]
-        """For each wheel: whether the board was counting its ticks when the last report arrived."""
+        """For each wheel: whether the board counted the wheel's ticks when the last report arrived.
+
+        Some boards count ticks only while a wheel is commanded forward.
+        """
         self._turned_m = 0.0
         self._still_s = 0.0
         """How long the board's odometry (0x20) has shown no tick, in s."""
@@ -231,15 +240,17 @@ class Comparison:
             self._take_equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Record that a wheel is at rest, and subtract the distance since its last certain motion.
+        """Record that a wheel is at rest, and correct the estimate of the wheel's distance.
 
-        ``index``: 0 left, 1 right.
+        The driver subtracts the distance that it has added since the wheel's motion was last
+        certain. ``index``: 0 left, 1 right.
         """
         self._speeds[index].come_to_rest()
 
     def _equal(self, told: Told, shown: tuple[float, float]) -> bool:
-        """Return whether both wheels have the same speed. The board does not report equal speeds.
+        """Return whether both wheels have the same speed.
 
+        For equal speeds, the board's odometry shows the speed zero instead of these speeds.
         ``shown``: for each wheel, the estimate of its last measured speed, in m/s.
         """
         left, right = (wheel.course.measured_sign for wheel in self._motion.wheels)

@@ -86,9 +86,9 @@ class Assembler:
 
     @property
     def resolves_at(self) -> float:
-        """Time in s at which the held group is returned if no further line comes.
+        """Time in s at which the held group of lines is returned if no further line comes.
 
-        Infinity if no group is held, or if its lines may still be missing.
+        Infinity if no group is held, or if further lines must come to complete the group.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -98,7 +98,7 @@ class Assembler:
         return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with ``left`` and ``right`` samples. Every other record is discarded."""
+        """Expect a record with ``left`` and ``right`` samples, and discard all other records."""
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
@@ -167,7 +167,10 @@ class Assembler:
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _may_be_complete(self) -> bool:
-        """Return whether the held group may be complete, judged by its number of lines."""
+        """Return whether the lines of the current group may form a complete report.
+
+        The number of lines decides.
+        """
         if self._code is None or self._done:
             return False
         if len(self._payloads) not in _LENGTHS[Code(self._code)]:

@@ -62,7 +62,7 @@ class RecordAssembler:
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
-        """Expect a record with ``left`` and ``right`` samples. Every other record is discarded."""
+        """Expect a record with ``left`` and ``right`` samples, and discard all other records."""
         self._expected = kind, left, right
         self._begin(None)
 
