@@ -2,7 +2,8 @@
 
 """Speed limits for commands. They never change the direction of the linear velocity.
 
-Call ``require_finite`` first: only ``SpeedLimits.allow`` accepts NaN and infinity.
+The limits need finite numbers, so call ``require_finite`` first. Only ``SpeedLimits.allow`` needs
+no such call: for NaN and infinity, ``allow`` returns False.
 """
 
 import math

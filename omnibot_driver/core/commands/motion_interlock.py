@@ -57,23 +57,27 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        If the board has no ~/start, the release allows motion again after the monitor's second stop
-        within 60 s. In all other cases, the release changes nothing.
+        If the motion monitor has stopped the robot twice within 60 s, and the board has no ~/start,
+        the release ends the refusal of motion. In all other cases, the release changes nothing.
         """
         if self.until is Until.ESTOP:
             self.start()
 
     def expire(self, now: float, timeout_s: float) -> None:
-        """End the refusal after a first stop if ``timeout_s`` has passed without a command."""
+        """End the refusal of motion if ``timeout_s`` has passed without a command.
+
+        A refusal after the motion monitor's second stop within 60 s does not end in this way.
+        """
         if self.until is Until.RELEASE and not self.reason(now, timeout_s):
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Restart the wait of ``timeout_s`` that ends the refusal after the monitor's first stop.
+        """Restart the wait of ``timeout_s`` without commands that ends a refusal of motion.
 
-        Call this method after a refused command, because the sender of the command is still active.
-        Call this method also after a stall of ``stalled_s`` (s), because commands may have arrived
-        unnoticed. If the wait was over before the stall, the refusal ends.
+        Only a refusal after the motion monitor's first stop ends in this way. Call this method
+        after a refused command, because the sender of the command is still active. Call this method
+        also after a stall of ``stalled_s`` (s), because commands may have arrived unnoticed. If the
+        wait was already over when the stall began, this method ends the refusal.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now
@@ -81,8 +85,9 @@ class MotionInterlock:
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        ``timeout_s``: waiting time in s without commands after a first stop. ``stands``: whether
-        the command is a standstill, which is always allowed.
+        * ``timeout_s``: time in s. If no command comes for this time, a refusal after the motion
+          monitor's first stop ends.
+        * ``stands``: whether the command is a standstill, which is always allowed.
         """
         reason = "" if stands else self.reason(now, timeout_s)
         if not stands:

@@ -162,7 +162,10 @@ class CommandPipeline:
         return self.shaper.wheels(rates_radps, by=by), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
-        """Return the command to drive to a pose in the odometry frame, which never expires."""
+        """Return the command to drive to ``goal``. The command never expires.
+
+        ``goal``: a pose in the odometry frame.
+        """
         return self.shaper.pose(goal, before=self.policy.current), math.inf
 
     def wrote(self, packets: Packets, now: float) -> None:
@@ -253,8 +256,9 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        Only the loss of a goal gives a notice. Velocity commands come repeatedly, so the refusal of
-        the next one gives a notice.
+        If the robot was driving to a goal, a notice says that the goal is discarded. Any other
+        motion command needs no notice here: its sender repeats the command, and the driver then
+        reports the refusal.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)

@@ -104,8 +104,9 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written.
 
-        If a motion is in effect, its set-point is then sent again at once. The packets may contain
-        Stop, which has ended the motion, or may have completed a damaged motion frame.
+        If a motion command is in effect, its set-point is sent again at once, for two reasons. The
+        packets may contain Stop, which has stopped the robot. Or the board may have received only a
+        part of a motion frame, and have taken bytes of the packets as the missing part.
         """
         if self._heard is not None:
             self._heard(packets, now)

@@ -58,7 +58,7 @@ class Setpoint(Protocol):
         """The order at the end of the ramp. Without a ramp, the command has only this order."""
 
     def order(self, now: float) -> Order:
-        """Return the order for the time ``now``."""
+        """Return the motion order to send to the board at the time ``now``."""
 
     def check_anew(self) -> None:
         """Check the order with new settings. Raises CommandRefused if it cannot be encoded."""
@@ -68,7 +68,8 @@ class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
     * The attribute ``is_zero``: whether the command is a standstill.
-    * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
+    * The constructor's argument ``is_zero``: a function that returns whether an order is a
+      standstill. The function may raise CommandRefused.
     * ``before``: previous set-point. The ramp starts at the velocity that ``before`` has reached,
       or at rest if ``before`` is not a body velocity.
     * ``since``: earliest time, in s, at which a ramp can begin.
@@ -120,7 +121,8 @@ class SteadySetpoint:
     """A command whose order does not change.
 
     * The attribute ``is_zero``: whether the command is a standstill.
-    * The argument ``is_zero``: returns whether an order is a standstill. May raise CommandRefused.
+    * The constructor's argument ``is_zero``: a function that returns whether an order is a
+      standstill. The function may raise CommandRefused.
     """
 
     settled: Final = True
@@ -132,7 +134,7 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """Return the order, which is the same at all times."""
+        """Return the motion order to send to the board. This order never changes."""
         return self._order
 
     def check_anew(self) -> None:
@@ -149,9 +151,10 @@ class GoalSetpoint:
       discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
-    * ``before``: the previous command. If it is a goal too, the new goal takes over the smallest
-      distance to the previous goal that the robot has reached, plus the distance between the two
-      goals. So a repetition of the goal changes nothing.
+    * ``before``: the previous command, or None. Each goal stores the smallest distance and angle to
+      the goal that the robot has reached. If ``before`` is a goal too, the new goal starts with the
+      stored values of ``before``, plus the distance and angle between the two goals. So a
+      repetition of the goal changes nothing.
     """
 
     authority: Final = Authority.POSE
@@ -180,7 +183,7 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """Return the order, which is the same at all times."""
+        """Return the motion order to send to the board. This order never changes."""
         return self._order
 
     def check_anew(self) -> None:

@@ -29,14 +29,17 @@ AT_LEAST: Final = 2
 A single displacement could be damaged, or come from the time before the wheels began to turn.
 """
 PROOFS: Final = 2.0
-"""The driver waits for a proof for at least this multiple of the standstill that proves a stop.
+"""Factor for the shortest time in which the driver waits for a proof of a stop.
 
-The standstill must last ``still_s``, minus ``SLACK_S``.
+This shortest time is the factor times the duration of the standstill that proves a stop:
+``still_s`` minus ``SLACK_S``.
 """
 RAREST_S: Final = 1.0
-"""Longest assumed period of displacements, in s.
+"""Upper limit, in s, for the assumed period of displacements.
 
-A displacement that follows lost ones also covers their time, so it lasts longer than the period.
+The driver takes the duration of the last displacement as the period. After lost displacements, this
+duration is too long, because it also covers the time of the lost ones. So a longer duration is
+replaced by this limit.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
@@ -46,8 +49,8 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether the robot stood still for ``still_s`` after Stop, or the board paused, and
-      no motion was commanded or measured since then.
+    * ``proved``: whether the robot is known to stand still, because the board paused, or the robot
+      stood still for ``still_s`` after Stop. A commanded or measured motion ends the proof.
     * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
     * ``measured``: whether a displacement arrived later than ``UNDER_WAY_S`` after Stop.
     """
