@@ -45,7 +45,8 @@ class FejemisCommands:
     """The services and topics that give commands only to a Fejemis.
 
     * ``values``: the parameter values. The owner replaces them when the user sets a parameter.
-    * ``publish``: the function that answers a service when its job is done, by type of reading.
+    * ``publish``: for each type of reading, the function that handles such a reading. The only type
+      is JobDone: its function answers the service that has requested the job.
     """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
@@ -143,10 +144,11 @@ class FejemisCommands:
             self._warn(trouble)
 
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
-        """Call ``action``; return the reason for a refusal, or an empty string.
+        """Call ``action``, and return an empty string, the reason for a refusal, or a warning.
 
-        ``off``: whether ``action`` switches a device off. Such an action is called in any state of
-        the boards, except in a replay. If a port is closed, the method then returns a warning.
+        ``off``: whether ``action`` switches a device off. Such an action is refused only in a
+        replay. If a port is closed, the method still calls the action, and returns a warning that
+        the device may still be on.
         """
 
         def say(session: Session, now: float) -> str:

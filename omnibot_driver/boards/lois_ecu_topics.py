@@ -43,7 +43,7 @@ NOT_HEARD: Final = "no data from the board; connect it and switch it on, then ca
 
 
 class OwnTopic(Enum):
-    """The topic that can command only this board."""
+    """The command topic that only the LOIS ECU has."""
 
     DUTY = "duty_cmd"
 

@@ -10,8 +10,10 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds near the end of a minute. In these seconds, the driver sends TIME (set the clock) with
-the next full minute. The controller's clock is then at most 4 s fast.
+"""Seconds of a minute, 56 to 58, in which the driver sends TIME with the next full minute.
+
+TIME sets the controller's clock. TIME comes up to 4 s before the next minute begins, so the clock
+is then up to 4 s fast.
 """
 
 

@@ -96,8 +96,9 @@ class Board(Protocol):
     """Capabilities of this kind of board."""
 
     settings: Any
-    """Settings of this board that its data does not show. The driver can replace the object at any
-    time.
+    """Settings that the driver cannot learn from the board's data.
+
+    The driver can replace the settings object at any time.
     """
 
     clock: ReadingClock | None = None
@@ -112,9 +113,9 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """How far the stream of IMU samples had arrived when the last read of the port ended.
+        """Place in the stream of IMU samples at which the last read of the port ended.
 
-        None if this is uncertain, or has not changed since the read before.
+        None if this place is uncertain, or is the same as after the previous read.
         """
         return None
 
@@ -204,8 +205,8 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        OdometryReadings, NoticeReadings and results of requests do not show that the board is
-        alive.
+        The driver regards the board as alive if this method returns a reading. OdometryReadings,
+        NoticeReadings and results of requests are exceptions: they can follow from time alone.
         """
         return []
 
@@ -247,7 +248,8 @@ class Board(Protocol):
     def pause(self) -> Packets:
         """Return the packets that pause a running board.
 
-        Raises RequestRefused if the same packets might resume a paused board.
+        Raises RequestRefused if the board may already be paused, and these packets would then start
+        the board again.
         """
         return NO_PACKETS
 

@@ -46,7 +46,8 @@ class Liveness:
     def is_silent(self, now: float) -> bool:
         """Return whether the board is silent.
 
-        Silent means: no bytes since the port was opened, or no reading for ``Traits.silence_s``.
+        The board is silent from the opening of the port to the first bytes, and after
+        ``Traits.silence_s`` without a reading.
         """
         return self.came_at == -math.inf or now - self.heard_at >= self.silence_s
 

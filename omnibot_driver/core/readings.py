@@ -190,7 +190,7 @@ Reading = (
 
 @value(frozen=True, slots=True)
 class SampleBoundary:
-    """How far the stream of IMU samples had arrived when a read of the port ended.
+    """Place in the stream of IMU samples at which a read of the port ended.
 
     * ``ahead``: 1 if a sample has arrived, at least its first part, and was not returned as an
       ImuReading yet; else 0.

@@ -14,7 +14,10 @@ from omnibot_driver.core.requests import RequestDone
 
 MEASURE_S: Final = 2.0
 BLOCK_S: Final = 1.0
-"""Length in s of each observation while no measurement is requested."""
+"""Length in s of one observation of the gyro while the user has not requested a measurement.
+
+The observation for a requested measurement lasts ``MEASURE_S``.
+"""
 GAP_S: Final = 0.2
 """Longest allowed time between two readings of one observation, in s."""
 ANSWER_WITHIN_S: Final = 4.0
