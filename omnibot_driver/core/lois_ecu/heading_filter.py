@@ -10,8 +10,9 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Factor in the largest accepted difference of a heading from the expected one, in degrees:
-``NEAR_DEG + NEAR_PART * turn``. ``turn``: change of the odometry's yaw since the last heading.
+"""Increase of the limit for a heading's error, as a fraction of the turn. A heading is accepted at
+once if it differs from the expected heading by at most ``NEAR_DEG + NEAR_PART * turn`` degrees.
+``turn``: change of the odometry's yaw since the last accepted heading, in degrees.
 """
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
@@ -20,7 +21,7 @@ MISTAKEN_WITHIN_DEG: Final = 12.0
 
 
 class HeadingFilter:
-    """Filter of compass headings. ``refused``: number of headings that the filter has rejected."""
+    """Filter of compass headings. It counts the rejected headings in ``refused``."""
 
     def __init__(self) -> None:
         self.refused = 0

@@ -15,8 +15,9 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Longest usual time in s without a report. Several tick reports that then arrive together were
-read late, and their times are corrected. ``BoardTime`` handles shorter delays.
+"""Longest usual time in s without a report. If several tick reports arrive together after a longer
+time, the computer has read them late, and their times are corrected. ``BoardTime`` handles shorter
+delays.
 """
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
@@ -111,7 +112,9 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        Both its clock and its tick counts then begin at zero. A clock in ns also wraps every 4.3 s.
+        A restart sets the board's clock and its tick counts to zero. The clock alone does not show
+        a restart, because a clock in ns also wraps every 4.3 s. So the counts must have become
+        smaller, and must fit the short time that the clock shows.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

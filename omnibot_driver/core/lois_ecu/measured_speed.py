@@ -28,17 +28,18 @@ START_STDDEV_TICKS: Final = 0.9
 that the board's odometry (0x20) misses each time a wheel starts."""
 FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses while a
-wheel is faster than ``FAST_TICKS_PER_S``.
+"""Growth of the error variance of the board's odometry (0x20), in squared ticks per s.
 
-While the board sends, it notices ticks late, and computes no speed from some of them.
+The variance grows while a wheel is faster than ``FAST_TICKS_PER_S``. The board notices ticks late
+while it sends, so its odometry misses a part of the motion.
 """
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
-    """Predict the speeds of the wheels as last measured by the board, and its odometry (0x20).
+    """Predict what the board measures in a step: the speeds of the wheels, and its odometry (0x20).
 
-    ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
+    The prediction is stored in ``step``. ``before``: speeds of the left and right wheel at the
+    beginning of the step, in m/s.
     """
     dt, new = step.dt, step.new
     turn: Terms = [(TURN, 1.0)]

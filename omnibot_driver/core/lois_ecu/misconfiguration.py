@@ -26,14 +26,16 @@ OWN_GAINS: Final = (
     " nearly all drives, and by 2.2 m in one of 150. Run `calibrate step`, or set these parameters"
 )
 """Advice if the user has not set all gains; the braces stand for the names of the missing gains.
-The errors were measured in 150 forward drives with a build of the public firmware.
+The odometry errors in this text were measured in 150 forward drives with a build of the public
+firmware.
 """
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
     "the tick counts change faster than a wheel can turn, so the driver rejects the tick reports,"
     " and odom does not show the motion: check `ticks_per_revolution`"
 )
-"""Advice after ``TOO_FAST`` rejected tick reports in a row."""
+"""Advice for tick counts that change too fast. The user gets it when the number of tick reports
+rejected in a row reaches ``TOO_FAST``."""
 NO_TICKS_S: Final = 4.0
 LONGEST_STEP_S: Final = 0.5
 NO_TICKS_ADVICE: Final = (

@@ -38,8 +38,8 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts. Of a longer time, it predicts only the
-last part.
+"""Longest time in s that one call of ``advance`` predicts. If more time has passed, ``advance``
+skips the beginning, and predicts only the last ``LONGEST_STEP_S``.
 """
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
@@ -47,8 +47,9 @@ LATE_PART: Final = 0.6
 """Assumed standard deviation of the time at which a command takes effect, as a fraction of the
 speed controller's period."""
 ROLLS_S: Final = 0.1
-"""Standard deviation of the distance that a wheel rolls after an RPM set-point has taken its power
-away, in m per m/s. Motors and friction are unknown.
+"""Standard deviation, in s, of the time for which a wheel rolls on after an RPM set-point has cut
+the motor's power. The error of the distance is this time multiplied by the wheel's speed. Motors
+and friction are unknown.
 """
 REVERSES_S: Final = 0.2
 """Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign. The
@@ -76,11 +77,11 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest expected difference, in m/s, between the two measured wheel speeds since the
-        board's distance was last compared with the estimated distance.
+        """Smallest expected difference, in m/s, between the wheel speeds that the board measures.
 
-        While both speeds are equal, the public firmware does not update its position. So after a
-        small difference, the board's distance may be too short.
+        The value covers the time since the board's distance was last compared with the estimated
+        distance. While both speeds are equal, the public firmware does not update its position. So
+        after a small difference, the board's distance may be too short.
         """
         self.speed_errors = SpeedErrors(self)
         self.history = FilterHistory(self.filter)

@@ -2,8 +2,9 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-While the public firmware counts no ticks, the motion is predicted from the commands, and corrected
-by the board's own odometry (0x20). All times are arrival times in s; the caller passes the time.
+The public firmware does not count ticks in a backward drive, for example. The driver then predicts
+the motion from the commands, and corrects it by the board's own odometry (0x20). All times are
+arrival times in s; the caller passes the time.
 """
 
 import math
@@ -52,8 +53,9 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. While this is true, an odometry
-        report in the same read can correct the motion, so the wheels keep their ``blind`` flags."""
+        """Whether the time of the odometry is still that of the last estimate. When time passes,
+        the driver sets the wheels' ``blind`` flags, which mark motion without counted ticks, to
+        False. Until then, an odometry report in the same read can still correct this motion."""
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -332,10 +334,10 @@ class LoisOdometry:
 
     @property
     def _blind(self) -> bool:
-        """Whether the ticks of at least one wheel do not show its motion.
+        """Whether the ticks of at least one wheel do not show the wheel's motion.
 
-        The board counts the ticks of a wheel that rolls out backward as if the wheel rolled
-        forward.
+        The board counts no ticks of a wheel that is ``blind``. If a wheel still rolls backward
+        after its set-point has changed, the board counts the ticks as forward motion.
         """
         return not self._motion.signed and any(
             wheel.blind or (wheel.rolls_on and wheel.rolls_on_s) for wheel in self._motion.wheels

@@ -47,28 +47,31 @@ LONGEST_WAIT_S: Final = 0.5
 """Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
 may be due each time that a setting could be sent."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s, which the driver uses in turn. After a tick report, it waits for such a delay before
-it writes the next round of settings; after any report, before it requests a date. The board cannot
-receive while it sends: after a constant delay, every line could meet a report and be lost."""
+"""Delays in s after a report, which the driver uses in turn. After a tick report, such a delay
+passes before the driver writes the settings again. After any report, it passes before the driver
+requests a GPS date. The board cannot receive while it sends: after a constant delay, every line
+could coincide with a report, and be lost."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
 TICKS_DUE_S: Final = 1.5
-"""Time in s since the last ticks. Before a round writes the period of the ticks again, it waits for
-ticks. After this time without ticks, it no longer waits."""
+"""Longest wait for ticks, in s since the last ticks. When the driver has written a long period of
+the ticks, it writes the period again only after ticks have come, or after this wait."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
 boot, which takes two seconds."""
 UNANSWERED_S: Final = 5.0
 """Time in s after which the driver restores the board's mode if no date has arrived, although the
-board sends reports. On a bad line, too few ticks may arrive to start further rounds."""
+board sends reports. After the first ``ROUNDS`` rounds, the driver writes the settings again only
+when ticks arrive, and on a bad line, too few ticks may arrive."""
 RESYNC: Final = b"::"
-"""Characters between a line with a checksum and one without. To a board that expects no checksums,
-the first line is too long, and its end stays in the board's memory. If the second line then lost
-its only ``:`` and one more character, both lines together could form a motion command."""
+"""Characters between a line with a checksum and the next line, which has none. A board that expects
+no checksums keeps the surplus end of the first line, until a ``:`` begins a new line. Without these
+extra colons, the loss of two characters (the ``:`` of the second line, and one more) could join the
+end of the first line and the second line to a motion command."""
 
 
 class SettingsWriter:
@@ -115,7 +118,8 @@ class SettingsWriter:
     def ignored(self) -> bool:
         """Whether the board seems to ignore the settings.
 
-        True if they are still unconfirmed after twice the usual number of rounds.
+        True if the settings are still unconfirmed after the driver has written them ``2 * ROUNDS``
+        times, twice as often as usual.
         """
         return self._rounds - self._repeated >= 2 * ROUNDS and not self.confirmed
 
@@ -128,9 +132,10 @@ class SettingsWriter:
     def _waits(self) -> bool:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
-        While the robot drives, only the first ``ROUNDS`` rounds may begin, because each written
-        gain resets the controller of a wheel. A round that has begun is completed, because one line
-        may overwrite a setting that a later line restores.
+        While the robot drives, the driver writes all settings at most ``ROUNDS`` times, because
+        each written gain resets the controller of a wheel. The driver still sends the commands that
+        are already queued, because a command that was sent may have overwritten a setting that a
+        queued command restores.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
@@ -251,14 +256,14 @@ class SettingsWriter:
         return b"".join(map(self._encoded, found))
 
     def _encoded(self, command: Command) -> bytes:
-        """Return the line of ``command``. The user's setting decides whether it has a checksum.
+        """Return the line of ``command``, with a checksum if the user's setting says so.
 
         Two commands are exceptions:
 
-        * A terminal mode gets two lines while the settings are unconfirmed, and after ``repeat``.
-          The first line has a checksum: a board that has just booted obeys only lines with a
-          checksum. If no motion is commanded, Stop follows, because the board may have ignored the
-          earlier Stops.
+        * A terminal mode is sent in two lines while the settings are unconfirmed, and after
+          ``repeat``. The first line has a checksum, because a board that has just booted obeys only
+          such lines; the second line has none. If no motion is commanded, a Stop is added, because
+          the board may have ignored the earlier Stops.
         * Stop never has a checksum (see ``_begin_round``).
         """
         if command == outbound.STOP:
@@ -270,15 +275,16 @@ class SettingsWriter:
         return line
 
     def _begin_round(self, now: float) -> None:
-        """Queue all settings for the next round.
+        """Begin the next round: queue the commands that write all settings.
 
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
         Another program may have switched the board's checksums off while the robot rolls. The board
-        then ignores a Stop with a checksum. So while the settings are unconfirmed, each of the
-        first ``ROUNDS`` rounds begins with a Stop without one. With ``checksum: false``, the mode
-        comes first, then a Stop without a checksum (see ``_encoded``). A Stop with a checksum would
-        be dangerous: if two of its zeros were lost, its checksum would command a duty.
+        then ignores a Stop with a checksum. So while the settings are unconfirmed, the driver sends
+        a Stop without a checksum: at the beginning of each of the first ``ROUNDS`` rounds, or, with
+        ``checksum: false``, after each terminal mode (see ``_encoded``). A Stop with a checksum
+        would be dangerous: if two of its zeros were lost, the board would read its checksum as a
+        duty.
         """
         if self._queue or not self._rounds_left:
             return
@@ -303,13 +309,13 @@ class SettingsWriter:
         self._round_at_s = max(self._round_at_s, at_s)
 
     def _writes_ticks(self, now: float) -> bool:
-        """Return whether a round that begins now writes the period of the ticks.
+        """Return whether the round of settings that begins now writes the period of the ticks.
 
-        When the period is written, the board begins it anew, so the next ticks come later. If each
-        round wrote a long period, no ticks might come until the rounds are over. So a long period
-        is written again only after ticks have come, or after ``TICKS_DUE_S`` without ticks. After
-        ``ROUNDS`` rounds, only every third round writes the period, because only ticks at
-        undisturbed intervals can confirm it.
+        Each write restarts the period on the board, so the next ticks come later. If each round
+        wrote a long period, no ticks might come until the rounds are over. So the driver writes a
+        long period again only after ticks have come, or after ``TICKS_DUE_S`` without ticks. After
+        ``ROUNDS`` rounds, only every third round writes a period of the ticks, because only ticks
+        at undisturbed intervals can confirm the period.
         """
         awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S
         return not (awaited and slow_ticks(self.settings)) and (
@@ -319,7 +325,7 @@ class SettingsWriter:
     def recovery(self) -> bytes:
         """Return the lines that restore the mode of a board that is silent or does not obey.
 
-        Stop follows, so the caller must not call this method while motion is commanded.
+        The last lines are Stops, so the caller must not call this method while motion is commanded.
         """
         self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM

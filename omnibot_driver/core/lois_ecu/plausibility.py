@@ -106,7 +106,8 @@ class Gate(Generic[Group]):
 class TicksGate(Gate[Ticks]):
     """Check of the reports of encoder ticks.
 
-    Later reports must fit the unit of the board's clock, once it is known.
+    When the driver has found out whether the board's clock counts ms or ns, the clock in each
+    further report must fit this unit.
 
     ``ticks_per_revolution``: may be replaced at any time.
 

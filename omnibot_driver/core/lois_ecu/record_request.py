@@ -57,7 +57,8 @@ def command_of(kind: RecordKind, samples: int) -> Command:
 
 
 class RecordRequest:
-    """Request for one record. ``kind``: kind of the expected record, None if none is expected."""
+    """Request for a record. ``kind``: kind of the requested record; None while none is requested.
+    """
 
     def __init__(self) -> None:
         self.kind: RecordKind | None = None
@@ -85,8 +86,8 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings ``found``, with the result of the request if it is known now.
 
-        An unrequested record is removed. If no reading is left while lines of a record arrive,
-        return a RecordComes.
+        A record that was not requested is removed from the readings. If no readings are left to
+        return, and lines of a record are arriving, the method returns a RecordComes.
 
         ``prevented``: why the board cannot send the record, as a sentence; empty if it can.
         """

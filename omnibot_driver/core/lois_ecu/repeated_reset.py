@@ -24,7 +24,8 @@ After a boot, the report period is 0.4 s, so one unchanged report is enough.
 class RepeatedReset:
     """A reset of the board with which ``ecu`` converses. It is sent at most ``RESETS`` times.
 
-    * ``left``: how many times it can still be sent; ``RESETS`` until the caller has sent it once.
+    * ``left``: how many times the reset can still be sent. The method ``begin`` sets this number to
+      ``RESETS``, and ``plan`` reduces it after each sending.
     * ``again_at_s``: time in s at which to call ``again``; infinity if no repetition is planned.
     """
 
@@ -74,7 +75,7 @@ class RepeatedReset:
     def readings(self) -> list[Reading]:
         """Return a ResetReading if the latest tick counts show the reset; otherwise nothing.
 
-        The first time, also write the settings again.
+        When tick counts show the reset for the first time, also write the settings again.
         """
         proof, known = self._proof, self._ecu.translation.counts
         if proof is None or known.last is None or known.last is self._seen:

@@ -29,7 +29,8 @@ SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
 """``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, from one reported
-speed to the next. A larger change shows that the board has noticed a tick late."""
+speed to the next, in ``duration`` s. After a larger change, the speed is rejected: the board has
+noticed a tick late, and so has measured a wrong speed."""
 FIRST_RPM: Final = 8.0
 FIRST_PART: Final = 2.0
 """``FIRST_RPM + FIRST_PART * expected``: largest plausible first speed, in RPM, of a wheel that
@@ -46,8 +47,8 @@ SWINGS_PART: Final = 0.4
 """Assumed duration of an unexpected change of speed, as a fraction of the time between two
 reports."""
 UNSEEN_PART: Final = 0.6
-"""Limit for the integral of a speed controller (``wound_m``) while its wheel does not tick, as a
-fraction of ``WINDUP_M``. At ``WINDUP_M``, the controller would start the wheel."""
+"""Largest assumed integral of a speed controller (``wound_m``) while the wheel does not tick, as a
+fraction of ``WINDUP_M``. If the integral reached ``WINDUP_M``, the wheel would start to move."""
 
 
 class ReportedSpeed:
@@ -66,7 +67,8 @@ class ReportedSpeed:
         self._false = False
         """Whether the board keeps reporting a speed that the wheel never had."""
         self.misleads = False
-        """Whether a speed that the wheel never had has changed the board's last heading."""
+        """Whether the board has computed its latest heading from a speed that the wheel did not
+        have."""
         self._doubted_m = 0.0
         """Standard deviation in m that was added to the wheel's distance, because the wheel may be
         at rest. A change of the reported speed sets it to 0."""
@@ -104,8 +106,9 @@ class ReportedSpeed:
     def judge(self, speed_mps: float, duration_s: float) -> None:
         """Decide whether a reported speed is plausible. Call this before ``take``.
 
-        After a rejected speed, a different speed is accepted without a check: it is a new
-        measurement.
+        If the previous speed was rejected, and the board now reports a different speed, the wheel
+        has ticked again. The board has then measured anew, so the new speed is accepted without a
+        check.
         """
         motion, before_mps, misled = self._motion, self._rejected_mps, self._false
         self._rejected_mps, self._false, self.misleads = None, False, misled
@@ -225,7 +228,11 @@ class ReportedSpeed:
             self._doubted_m = wrong_m
 
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel's estimate by its mean speed between the last two ticks."""
+        """Correct the wheel's estimated motion by a reported speed.
+
+        ``speed_mps``: the reported speed, which is the wheel's mean speed between its last two
+        ticks, in m/s, with sign. ``duration_s``: time since the last report, in s.
+        """
         motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
         push = estimate.mean[base + PUSH]
         lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)

@@ -13,17 +13,17 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 # A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
 FEW_TURNS: Final = 0.3
 FEW_TICKS: Final = 2
-"""``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS`` ticks: largest count that is regarded as near
-zero. A stopped wheel is assumed to roll at most this far."""
+"""Largest count that is regarded as near zero: ``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS``
+ticks. A stopped wheel is assumed to roll at most this far."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
-"""``JUMP_TURNS`` turns of a wheel, plus ``JUMP_TICKS`` ticks: smallest fall of a count, to near
-zero, that proves a reset. No wheel can roll as far between a reset and the next counts."""
+"""Smallest fall of a count to near zero that proves a reset: ``JUMP_TURNS`` turns of a wheel, plus
+``JUMP_TICKS`` ticks. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""``STEADY_TURNS`` turns of a wheel, plus ``STEADY_TICKS`` ticks: smallest count before a
-reset that can prove the reset of a robot at rest. For the proof, both counts must be zero after the
-reset. Backlash changes a count by less."""
+"""Smallest count of a robot at rest whose fall to zero proves a reset: ``STEADY_TURNS`` turns of a
+wheel, plus ``STEADY_TICKS`` ticks. After the reset, the counts of both wheels must be zero.
+Backlash changes a count by less than this limit."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""
@@ -46,11 +46,11 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Record that the driver repeats the reset.
+        """Record that the driver sends the reset again.
 
-        ``before``: the tick counts at the repetition. If the wheels are at rest (``steady``), and
-        these counts are so large that a reset would change them visibly, they replace the tick
-        counts from before the reset.
+        ``before``: the last tick counts before this repetition. If the wheels are at rest
+        (``steady``), and a fall of these counts to zero would prove a reset, the proof uses them
+        instead of earlier counts.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady
@@ -59,8 +59,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the result of the reset now.
 
-        The counts ``ticks`` must be near zero, and must prove the reset. If the counts are near
-        zero after ``UNPROVED_S``, no proof is necessary.
+        The result is True if the counts ``ticks`` are near zero, and prove the reset. From
+        ``UNPROVED_S`` after the first call, counts near zero are enough.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -26,11 +26,12 @@ LOST_S: Final = 0.25
 """Limit for the mean time in s between the last ``LOST_REPORTS`` reports. If the mean time is above
 the limit, reports are lost, or the board rarely sends reports."""
 REPORT_S: Final = 0.2
-"""Longest time in s between two reports, if none is lost. While many reports are lost, this module
-counts at most ``REPORT_S`` for each report. Otherwise, it would forget earlier speeds too soon."""
+"""Longest usual time in s between two reports. While reports are lost, this module's clock advances
+by at most ``REPORT_S`` for each report that arrives, so that earlier speeds are not forgotten too
+soon."""
 HIDDEN_PART: Final = 0.3
-"""Speed of this module's clock, as a fraction of real time, while the board does not report the
-wheel's speed. The slow clock keeps earlier speeds for longer."""
+"""Rate of this module's clock while the board does not report the wheel's speed, as a fraction of
+real time. By this clock, earlier speeds are forgotten, so a slow clock keeps them for longer."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -39,9 +40,14 @@ FASTER: Final[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 1.0)
 FELL_IN_GAPS: Final[tuple[float, ...]] = (0.0, 0.6, 0.8, 0.9, 1.0)
 GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1.0)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that a wheel is at rest, by the number of times that its reported speed was
-repeated. ``FASTER`` is assumed; the others were counted on the public firmware. They depend on the
-last change of the reported speed. A fall is a decrease by at least ``FELL_RPM``:
+"""Probabilities that a wheel is at rest while the board repeats the wheel's reported speed.
+
+Each constant begins with the probability for a new speed. The next values are for a speed that was
+repeated once, twice, and so on; the last value is also for all further repetitions. The values of
+``FASTER`` are assumed; those of the other constants were counted on the public firmware.
+
+The last change of the reported speed decides which constant applies. A *fall* is a decrease by at
+least ``FELL_RPM``:
 
 * ``FAST``: after a fall to a speed above ``FAST_RPM``.
 * ``FAR``: after a fall by at least ``FELL_FAR_RPM``.

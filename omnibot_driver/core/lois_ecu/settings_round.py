@@ -23,15 +23,19 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
-"""Longest period of the ticks in ms that each of the first ``ROUNDS`` rounds writes. Each write
-begins a period anew, but with so short a period, these rounds keep the ticks away for less than
-1 s."""
+"""Longest period of the ticks, in ms, that each of the first ``ROUNDS`` rounds of settings writes.
+Each write restarts the period on the board, and so delays the next ticks. With a period of at most
+``FAST_TICKS_MS``, these rounds delay the ticks by less than 1 s."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the left short correction in the public firmware after a boot."""
 
 
 def slow_ticks(settings: LoisEcuSettings) -> bool:
-    """Return whether five rounds could keep the ticks away for 1 s or more."""
+    """Return whether the period of the ticks is too long to be written in each round of settings.
+
+    Each write restarts the period on the board. If each of five rounds wrote a long period, the
+    board might send no ticks for 1 s or more.
+    """
     return settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
 
 
@@ -60,9 +64,10 @@ def left_short_correction(settings: LoisEcuSettings) -> WriteSetting:
 def round_commands(
     settings: LoisEcuSettings, number: int, *, ticks: bool, correction: bool, date: bool
 ) -> list[Command]:
-    """Return the commands of a round, in an order that changes from round to round.
+    """Return the commands of a round of settings, in an order that changes from round to round.
 
-    With a constant order, a board that sends could miss the same line in each round.
+    The board cannot receive while it sends reports. If the order were constant, the board could
+    miss the same line in each round.
 
     The request for a date comes last: the board answers at once, and would miss the next line.
 
@@ -96,7 +101,10 @@ def _writes(settings: LoisEcuSettings, *, ticks: bool, correction: bool) -> Iter
 
 
 def _repeating(commands: Iterable[Command], settings: LoisEcuSettings) -> Iterator[Command]:
-    """Yield ``commands``; a long period of the ticks twice, because few rounds write it."""
+    """Yield ``commands``. A command that sets a long period of the ticks is yielded twice.
+
+    Few rounds of settings write a long period, and the board may lose a single line.
+    """
     for command in commands:
         yield command
         if sets_ticks(command) and slow_ticks(settings):

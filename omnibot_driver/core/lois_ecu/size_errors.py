@@ -23,7 +23,7 @@ standard deviation of the fraction of the distance that is lost because both whe
 
 
 class SizeErrors:
-    """Copies of the robot's path. Each copy has one error: a wrong wheel size, or a slip."""
+    """Variants of the robot's path. Each variant has one error: a wrong wheel size, or a slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)
@@ -42,7 +42,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Extend all copies of the path by the distances that the wheels have rolled.
+        """Extend the path, and all its variants, by the distances that the wheels have rolled.
 
         ``track_m``: track width; negative if the wheels are swapped.
         """

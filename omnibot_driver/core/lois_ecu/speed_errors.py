@@ -33,10 +33,11 @@ DUTY_STDDEV: Final = 0.3
 
 
 class SpeedErrors:
-    """The bias and the excess of both wheels in the motion filter ``motion``.
+    """Errors of the wheels' speeds in the motion filter ``motion``: a bias and an excess per wheel.
 
     In duty mode, a bias is a relative error. In other modes, a bias is the amount in m/s by which
-    the firmware rounds down a speed.
+    the firmware rounds down a speed. An excess is the fraction by which a wheel that rolls backward
+    is faster than its set-point.
     """
 
     def __init__(self, motion: "MotionFilter") -> None:
@@ -47,15 +48,17 @@ class SpeedErrors:
     def restored(self) -> None:
         """Record that the filter has gone back to an earlier state.
 
-        After a duty command, the restored biases may be those of RPM set-points.
+        After a duty command, the restored biases may be those of RPM set-points. In this case, the
+        next call of ``follow`` resets the errors of both wheels.
         """
         if self._kinds and "duty" in self._kinds:
             self._kinds = None
 
     def follow(self) -> None:
-        """Reset the bias of each wheel whose kind of command has changed, and then each excess.
+        """Reset the bias of each wheel whose kind of command has changed.
 
-        A Stop after a duty command does not change the kind, because it does not change the error
+        If the kind of at least one wheel has changed, also reset the excess of both wheels. A Stop
+        after a duty command does not change the kind, because such a Stop does not change the error
         of the speed.
         """
         before = self._kinds or ("", "")

@@ -30,14 +30,15 @@ TOO_FAST_RPM: Final = 3
 """A repeated speed is outdated, and the wheel is at rest, if the speed is more than ``TOO_FAST``
 times the set-point, and more than ``TOO_FAST_RPM`` RPM above it."""
 UNLIKE: Final = 1.15
-"""Limit for the difference between two wheels that roll backward. Usually, a wheel's ratio of speed
-to set-point is at most ``UNLIKE`` times the ratio of the other wheel."""
+"""Largest usual ratio between the *relative speeds* of two wheels that roll backward. The relative
+speed of a wheel is its speed divided by its set-point. Up to ``UNLIKE`` times the relative speed of
+the other wheel, the reported speed of a wheel is not regarded as too high."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
-"""``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion that show a stall,
-after a forward or a backward command. While a wheel rolls steadily backward, the board can report
-the same speed a few times."""
+"""``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion that show a
+stalled wheel, after a forward or a backward command. While a wheel rolls steadily backward, the
+board can report the same speed a few times."""
 
 
 class StallWatch:
@@ -45,8 +46,8 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``may_roll``: for each wheel, whether it may roll in spite of the stall, because the repeated
-    speed is too high for a wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll although it seems to be stalled. This is so if
+    the board keeps reporting a speed that is too high for a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -56,14 +57,14 @@ class StallWatch:
         self.may_roll = [False, False]
         self._quiet = [0, 0]
         """For each wheel: number of reports that could have shown a motion, but did not. It is set
-        to zero by motion, by a command that starts or reverses the wheel, and by a stall of any
-        wheel."""
+        to zero by motion, by a command that starts or reverses the wheel, and when ``stalled``
+        reports any wheel."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record a set-point. A wheel that is driven by duty is never regarded as stalled."""
+        """Record a set-point. A wheel that is driven by duty is not checked."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
@@ -84,7 +85,7 @@ class StallWatch:
     ) -> None:
         """Process a report: ticks, or the board's odometry.
 
-        The ticks show forward motion; the board's odometry shows backward motion.
+        The driver sees forward motion in the ticks, and backward motion in the board's odometry.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """
@@ -110,8 +111,9 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
-        At least ``AT_LEAST`` (forward) or ``AT_LEAST_BACKWARD`` reports are needed. A stall
-        restarts the times and the counts of both wheels.
+        The result is True only after at least ``AT_LEAST`` reports without motion, or after at
+        least ``AT_LEAST_BACKWARD`` reports in a backward drive. If the result is True for a wheel,
+        the times and the numbers of reports of both wheels begin again from zero.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)

@@ -23,8 +23,9 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    The robot is stopped before the board is brought into a sensor's mode, and before each change
-    that is passed to ``stop_first``. ``want`` and ``stop_first`` may be called at any time.
+    The driver stops the robot before the board enters a sensor's mode, and before each change of a
+    parameter that the caller announces by ``stop_first``. ``want`` requests a mode. ``want`` and
+    ``stop_first`` may be called at any time.
     """
 
     def __init__(self) -> None:
@@ -108,11 +109,14 @@ class ModeChange:
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
-        """Return the command to send now to stop the robot before a change, or None.
+        """Return the command to send now to stop the robot, or None if no stop is needed.
+
+        The robot must stop before some changes of a mode or parameter (see ``stop_first``):
 
         * First: Stop, until the robot is at rest, but at most for ``UNPROVED_S``.
-        * Then: RPM 0/0, until ``cleared``. RPM 0/0 clears the RPM target: while the target is
-          positive, the public firmware counts backward motion by duty as forward motion.
+        * Then: RPM 0/0, until ``cleared``. RPM 0/0 clears the RPM target. While the target is
+          positive, the public firmware counts the ticks of a wheel as forward motion, even if a
+          duty drives the wheel backward.
 
         ``stands``: whether the robot is seen at rest.
 

@@ -30,18 +30,20 @@ The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, pl
 ``RESTARTED_TICKS`` ticks.
 """
 SILENT_S: Final = 1.0
-"""Time in s without tick reports. After it, counts near zero and an irregular clock show a restart.
+"""Limit in s for a time without tick reports.
 
-After a shorter time, the wheels may also have rolled back.
+After a longer time, counts near zero and an irregular clock prove a restart of the board. After a
+shorter time, wheels that have rolled back may explain such counts, so the expected motion must
+contradict the counts too.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Limit, in s, for the time since the previous tick report, if the unit of the board's clock is no
-longer known after the new report.
+"""Longest time in s for which the driver assumes that wheels roll back between two tick reports.
 
-From this time, the driver computes how far the wheels may have rolled back. If the time is longer,
-the driver uses this limit instead.
+This limit applies if the driver knew the unit of the board's clock, and the new report contradicts
+this unit. From the time between the two reports, the driver computes how far the wheels may have
+rolled back. If more time has passed, the driver uses this limit instead of it.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.
@@ -153,16 +155,17 @@ class TickCounts:
         return True
 
     def _may_be_new(self, ticks: Ticks, fallen: int, duration_s: float, now: float) -> bool:
-        """Return whether counts that have decreased fast can be those of a restarted board.
+        """Return whether the new counts after a large decrease can be those of a restarted board.
+
+        ``fallen``: decrease in ticks, of the wheel whose count has decreased more. ``duration_s``:
+        time in s since the previous report.
 
         The result is False in two cases:
 
-        * A count is larger than the number of ticks that a wheel can roll in ``duration_s``.
-        * The expected motion explains the counts, and a wheel can roll back that far in
-          ``duration_s``. This case requires that the clock counts ns, that the board counts the
+        * A new count is larger than the number of ticks that a wheel can roll in ``duration_s``.
+        * The expected motion explains the new counts, and a wheel can roll back by ``fallen`` ticks
+          in ``duration_s``. This case requires that the clock counts ns, that the board counts the
           ticks of both wheels, and that ``duration_s`` is at most ``SILENT_S``.
-
-        ``fallen``: the larger one of the two counts' decreases, in ticks.
         """
         turns = FASTEST_TURNS_PER_S * duration_s + TURNS_MARGIN
         most = turns * self.ticks_per_revolution + TICKS_MARGIN
@@ -176,9 +179,10 @@ class TickCounts:
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
         """Return the time in s since the board's start, by the board's clock.
 
-        None if the unit of the clock is unknown. A clock in ns wraps every 4.3 s. So with a clock
-        in ns, the result is also None if this clock may have wrapped since the previous report, or
-        if it shows a start before the previous report.
+        The caller assumes that the board has started since the previous report. The result is None
+        if the unit of the clock is unknown. A clock in ns wraps every 4.3 s. With such a clock, the
+        result is also None if the clock may have wrapped since the previous report, or if the clock
+        shows a longer time than ``duration_s``.
 
         ``duration_s``: time in s since the previous report.
         """
@@ -192,10 +196,10 @@ class TickCounts:
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
         """Return whether the clock and the counts prove a restart of the board.
 
-        The clock must be irregular, and rolling wheels must not explain the counts. After more than
-        ``SILENT_S`` without ticks, the clock alone is enough.
+        The clock must deviate from the fitted clock, and rolling wheels must not explain the
+        counts. After more than ``SILENT_S`` without ticks, the clock alone is enough.
 
-        Without a proof, increase the uncertainty of the odometry.
+        Without a proof, this method increases the uncertainty of the odometry.
         """
         odometry, silent = self._odometry, duration_s > SILENT_S
         deviation_s, certain = self.time.deviation_s(ticks.time_counts, self.unit, now)

@@ -46,11 +46,12 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Factors in s for the error of a wheel's distance. A wheel that halts soon after a new set-point
-has not yet reached the assumed speed, so it has rolled less far than assumed.
+"""Factors in s for an error of a wheel's distance, with the board's own gains and with the user's.
 
-The standard deviation of the error in m is the factor times ``unsettled_mps``. First factor: for
-the board's own gains. Second factor: for the user's gains.
+A wheel that halts soon after a new set-point has not yet reached the assumed speed, so it has
+rolled less far than assumed. The standard deviation of this error in m is the factor times
+``unsettled_mps``: the difference between target and speed when the set-point took effect, which
+decays with time.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -94,9 +95,9 @@ class Wheel:
         self.rolled_to_m = 0.0
         """Distance in m that the wheel had rolled when its motion was last certain.
 
-        The motion is certain at a new measured speed, a restart of the board, a reset of the
-        controller, and the start of the wheel. If the wheel proves to have rested since then, the
-        driver subtracts the distance that it has added meanwhile.
+        The motion is certain when the board measures a new speed, when the board restarts, when the
+        speed controller is reset, and when the wheel starts. If the driver notices later that the
+        wheel has been at rest since then, it subtracts the distance that it has added since then.
         """
         self.begin_again()
 
@@ -113,9 +114,9 @@ class Wheel:
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
-        """Whether the controller was reset, and the wheel has no power yet.
+        """Whether the wheel still has no power after a reset of its speed controller.
 
-        The wheel gets power again when the integral ``wound_m`` is large enough.
+        The wheel gets power again when the controller's integral, ``wound_m``, is large enough.
         """
         self.rolls_on = False
         """Whether the reported speed may still belong to the motion before the last reset of the
@@ -123,13 +124,15 @@ class Wheel:
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """Time in s since the last reset of the controller.
+        """Time in s since the wheel's speed controller was last reset. The wheel may roll on for
+        some time.
 
         ``rolled_mps``: speed of the wheel at this reset, in m/s.
         """
         self.locked = False
-        """Whether the wheel is at rest, and gets no power, because its last measured speed exceeds
-        the target."""
+        """Whether the wheel is at rest, and cannot start because its controller gives no power. The
+        controller still uses the last speed from before the standstill, which exceeds the target.
+        """
         self.rests = False
         """Whether the driver has concluded that the wheel is at rest.
 
@@ -159,6 +162,8 @@ class Wheel:
     def counts(self, speed_mps: float, *, signed: bool) -> float:
         """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
+        * 1: the count increases when the wheel rolls forward. If ``signed``, the count decreases
+          when the wheel rolls backward, and the factor is always 1.
         * -1: the wheel rolls backward, but the count increases.
         * 0: the board does not count.
 
@@ -172,7 +177,7 @@ class Wheel:
         return -1.0 if rolls_back else 1.0
 
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
-        """Add the motion of the wheel during one step of the filter to ``step``.
+        """Predict the motion of the wheel in one step of the filter, and store it in ``step``.
 
         ``holds``: whether the board keeps the last measured speed of a wheel at rest.
 

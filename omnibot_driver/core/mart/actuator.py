@@ -2,8 +2,8 @@
 
 """The actuator of the MART controller: it passes commands to the ``Pilot``.
 
-This module knows which commands the controller cannot carry out; it does not know what is sent. The
-caller passes the time.
+This module knows which commands the controller cannot carry out; it does not know which requests
+the ``Pilot`` sends to the server. The caller passes the time.
 """
 
 from typing import Final
@@ -21,7 +21,9 @@ FARTHEST_M: Final = 1000.0
 
 
 class Conductor:
-    """The actuator: it passes commands to the pilot, which sends one request at a time."""
+    """The actuator: it passes commands to ``pilot``, which sends one request at a time to the
+    server.
+    """
 
     rate_hz = 20.0
 

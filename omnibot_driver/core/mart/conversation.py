@@ -47,9 +47,10 @@ SLOW_S, DISTURBED_S = 0.06, 5.0
 time, a reply may answer an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Urgent queries. The driver sends them even if a late reply to an earlier query may still come.
+"""Urgent queries. The driver sends an urgent query even if a late reply to an earlier query may
+come.
 
-Their answers are then marked as doubtful.
+The answer to the urgent query is then marked as doubtful.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
@@ -128,7 +129,8 @@ class Conversation(LateReplies):
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now. Every command waits while a request is pending.
 
-        A query outside PRESSING also waits while a late reply could be mistaken for its reply.
+        A query that is not urgent (PRESSING) also waits while a late reply to an earlier request
+        could be mistaken for the reply to ``word``.
         """
         if self.pending is not None:
             return False
@@ -222,9 +224,12 @@ class Conversation(LateReplies):
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether ``reply`` is taken for a copy of the reply to another command.
 
-        ``word``: the command that is pending. The result is True only if ``word`` is a query,
-        the last reply to ``word`` was different, and an equal reply to another query or to a move
-        has just come.
+        ``word``: the command that is pending. The result is True only if three conditions hold:
+
+        * ``word`` is a query.
+        * ``reply`` differs from the last reply to ``word``.
+        * ``reply`` is equal to a reply that has just come to another query, or to a controlled
+          move.
         """
         if word.kind is not Kind.QUERY:
             return False  # equal replies are usual: RMCS reports the same angle as RMRA

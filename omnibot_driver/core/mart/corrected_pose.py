@@ -46,7 +46,7 @@ class CorrectedPose:
 
     @property
     def settings(self) -> MartSettings:
-        """The sizes and scales of the robot; may be replaced."""
+        """The sizes and scales of the robot. The caller may replace them."""
         return self._settings
 
     @settings.setter

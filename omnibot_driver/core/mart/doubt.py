@@ -39,7 +39,8 @@ TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 PIVOT: Final = 0.01
 """Standard deviation of the distance between the robot's centre and the point about which it turns.
 
-The value is a fraction of the track width; in turns below 1 rad, multiplied by the angle in rad.
+The value is a fraction of the track width. For a turn of less than 1 rad, the driver multiplies the
+standard deviation by the angle in rad.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
@@ -121,9 +122,11 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the constant heading error at the beginning of a motion.
+        """Store the present constant heading error, because a motion begins.
 
-        ``heading_told`` restores this error if the server reports the heading during the motion.
+        While the driver computes a turn from the commands, the constant heading error grows. If the
+        server reports the heading during the motion, ``heading_told`` sets the error to the stored
+        value.
         """
         self._bend_before_rad = self._levers[2][2]
 
@@ -155,8 +158,8 @@ class Doubt:
     def end_turn(self, spun_rad: float, told_rad: float | None) -> None:
         """Add the errors of a turn on the spot that has ended.
 
-        ``spun_rad``: the turn that the right wheel measured. ``told_rad``: the turn that the server
-        reported, or None.
+        ``spun_rad``: angle of the turn by the encoder of the right-hand wheel. ``told_rad``: angle
+        of the turn that the server reported, or None.
         """
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
@@ -169,10 +172,10 @@ class Doubt:
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
-        """Return the heading and position errors that a turn on the spot has caused so far.
+        """Return the variances of heading and position that a turn on the spot has caused so far.
 
-        ``spun_rad``: the turn that the right wheel measured. ``told_rad``: the turn that the server
-        reported, or None.
+        ``spun_rad``: angle of the turn by the encoder of the right-hand wheel. ``told_rad``: angle
+        of the turn that the server reported, or None.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))

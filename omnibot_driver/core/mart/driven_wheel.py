@@ -44,7 +44,8 @@ class DrivenWheel:
     def error(self, less: int, seconds: float, per_unit_mps: float) -> float:
         """Return the measured speed minus the expected one, in nominal units.
 
-        ``less``: units that the motor lacked in the averaging window, which lasts ``seconds``.
+        ``less``: units by which the motor was below the counted units in the averaging window,
+        because changes of the units did not arrive. ``seconds``: duration of the averaging window.
 
         ``per_unit_mps``: speed in m/s that an ideal motor has with one unit.
         """

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the pilot does after a start command that the server answers by a failure.
+"""What the ``Pilot`` does after a start command that the server answers by a failure.
 
-This module knows the failure texts and their usual causes; it does not start motions, and
-reads no clock.
+This module knows the failure texts and their usual causes; it does not start motions, and reads no
+clock.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Time in s from a failed start until the driver tries again."""
 NO_STARTS: Final = 3
-"""After this number of starts in a row that do not turn the right wheel, the driver gives up a
+"""After this number of starts in a row that do not turn the right-hand wheel, the driver gives up a
 backward drive (B) or a turn (R, L). Each start may turn the left wheel, and so move the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
@@ -26,13 +26,13 @@ One failed start is normal after a stop that took long.
 
 
 class FailedStarts(Adjusting):
-    """The part of the pilot that evaluates failed starts."""
+    """The part of ``Pilot`` that evaluates failed starts."""
 
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because the robot may move in spite of the failure.
 
-        ``arrived``: whether the reply certainly answers this start command, and a late copy of the
-        command is unlikely.
+        ``arrived``: whether the server has certainly received this start command. In this case, the
+        reply answers this command, and a copy of the command is not likely to arrive later.
         """
         word = self._start
         assert word is not None
@@ -54,8 +54,8 @@ class FailedStarts(Adjusting):
             if self.health.reference_fails >= REFERENCE_FAILS:
                 self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
                 why = (
-                    "the motors may be stuck or without power; forward motion is refused until"
-                    " the command ends"
+                    "check whether the motors are stuck or without power; forward motion is refused"
+                    " until the command for this motion ends"
                 )
         elif reply.reason == words.NO_START:
             why = self._not_turned()
@@ -67,7 +67,7 @@ class FailedStarts(Adjusting):
         self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _not_turned(self) -> str:
-        """Count a start that did not turn the right wheel.
+        """Count a start that has not turned the right-hand wheel.
 
         Return a text that tells the user what the driver does now.
         """

@@ -13,7 +13,7 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""Smallest distance or turn that is measured in a complete move, divided by the target.
+"""Smallest measured distance or turn of a move that seems complete, as a fraction of the target.
 
 The target is the requested or the expected distance or turn, whichever is smaller.
 """
@@ -162,7 +162,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came so early that the move cannot have been complete.
 
-        Such a reply belongs to another request, so the move was still in its first run. A stop that
-        the driver sent after this reply has ended the first run.
+        Such a reply answers another request, and the move was still in its first run. If the driver
+        sent a stop after this reply, the stop has therefore ended the first run, not a second run.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -159,7 +159,11 @@ class Move:
         self.said = self.turns = 0
 
     def begin(self, request: Request) -> None:
-        """Count the move that ``request`` commands, and the turns since the last straight move."""
+        """Count the move that ``request`` commands.
+
+        A turn also increases ``turns``, the number of turns since the last straight move. A
+        straight move sets ``turns`` to 0.
+        """
         self.said += 1
         self.turns = 0 if request.word in (TF, TB) else self.turns + 1
 

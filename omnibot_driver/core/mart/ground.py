@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The base of the pilot: it stores the state of server and robot, and sends commands.
+"""The base class of ``Pilot``: it stores the state of server and robot, and sends commands.
 
 This module knows states and commands; it does not know why a command is sent. The caller passes the
 time.
@@ -46,9 +46,9 @@ VOLTS and most motion commands crash a server that starts up. If RM (forward dri
 server, the motors stay on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Terms of the silence in s after which the driver regards the server as absent.
+"""Limit for a silence of the server. After a longer silence, the server is regarded as absent.
 
-This silence is ABSENT_S plus ABSENT_TRIPS times the average duration of a query.
+The limit in s is ABSENT_S plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
 """Largest number of unanswered HELLO queries for which the driver still expects answers. If more
@@ -59,18 +59,19 @@ NO_HEADING: Final = (
     " the odometry is uncertain: check the network and the server"
 )
 PRESENT_S: Final = 0.35
-"""Part, in s, of the longest silence in which the server cannot have been restarted.
+"""Constant term, in s, of a limit for a silence of the server.
 
-The other part of this silence is ABSENT_TRIPS times the average duration of a query.
+The limit is PRESENT_S plus ABSENT_TRIPS times the average duration of a query. In a shorter
+silence, the server cannot have been restarted.
 """
 GAP_S, GAP_LONGEST_S = 0.12, 1.0
-"""Times in s for a short silence while the robot is at rest. The server may have been restarted.
+"""Times in s to detect a restart of the server by a short silence while the robot is at rest.
 
-``GAP_S``: a silence counts if it is longer than this time plus twice the average duration of a
-query.
+``GAP_S``: after a silence longer than this time plus twice the average duration of a query, the
+server may have been restarted, so the driver reads the heading. A heading of exactly zero shows a
+restart.
 
-``GAP_LONGEST_S``: after such a silence, the driver waits at most this time for a heading. A heading
-of exactly zero shows a restart.
+``GAP_LONGEST_S``: longest wait of the driver for this heading, from the end of the silence.
 """
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
@@ -93,13 +94,13 @@ At rest, a stop is harmless: the server only answers ``fail``.
 
 
 class Ground:
-    """The state that all parts of the pilot share.
+    """The state that all parts of ``Pilot`` share.
 
     * ``readings``: readings that the caller has not taken yet.
     * ``heard_s``: time of the server's last reply.
     * ``appeared_s``: time of the server's first reply after an absence.
     * ``greeted``: whether the server has answered the first stop of this connection.
-    * ``settings``: the sizes and scales of the robot; may be replaced.
+    * ``settings``: the sizes and scales of the robot. The caller may replace them.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -190,9 +191,11 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that is in progress, or that the server may run again.
+        """Start time of a controlled move that the server is running, or may be running a second
+        time.
 
-        None if there is no such move. The server reports no measurements during the move.
+        A duplicated request causes the second run. The server reports no measurements during a
+        move. The result is None if there is no such move.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
@@ -229,8 +232,8 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply. Decide whether the server may have been restarted.
 
-        The signs are a long silence before this reply, or previous replies from another kind of
-        server.
+        A restart is possible after a long silence. It is also possible if the last answer to HELLO
+        came from a server that is not a motion controller.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:

@@ -49,8 +49,8 @@ A reading is uncertain if its reply may answer another query.
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s after a failed RM (forward drive) in which RM is the assumed cause of a motion without
-a command."""
+"""Limit in s for the time since the server reported a failure of RM (forward drive). If the robot
+moves without a command within this time, the driver assumes that RM has started the motors."""
 
 
 class Health:
@@ -91,7 +91,7 @@ class Health:
     def measured(
         self, word: Word, reply: Ok, now: float, *, uncertain: bool = False
     ) -> list[Reading]:
-        """Return the readings from a reply to one of the less frequent queries.
+        """Return the readings from a reply about voltage, motor board, dock or sonars.
 
         ``uncertain``: the reply may answer another query, so several equal readings are required.
         """
@@ -146,10 +146,10 @@ class Health:
             self.status = bits
 
     def outlives(self) -> None:
-        """Record that the server answered a stop late, after the driver had used the stop port.
+        """Record that the stop port of the server may hang during the next motion.
 
-        The stop port may still wait for the end of the motion that it should stop. The port may
-        then hang during the next motion.
+        The driver has used the stop port to end a motion, and only afterwards the server has
+        answered an earlier stop. So the stop port may still wait for the end of that motion.
         """
         self.outlived, self._may_be_restarted = True, False
 
@@ -188,16 +188,17 @@ class Health:
     def heading_changed(self, motion: Motion) -> None:
         """Record that the reported heading has changed during a motion of the kind ``motion``.
 
-        After HEADING_CHANGES changes, the driver expects headings in all motions of this kind.
+        After HEADING_CHANGES changes, the driver assumes that the server updates the heading in all
+        motions of this kind.
         """
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
     def reference_failed(self, now: float) -> None:
-        """Record that RM (forward drive) has failed without a special reason.
+        """Record that RM (forward drive) has failed, and that the server has not named the cause.
 
-        The server's reply contained no reason, or it said that no wheel has turned.
+        The server's reply contained no text after ``fail``, or only said that no wheel has turned.
         """
         self.reference_fails += 1
         self._reference_failed_s = now
@@ -209,8 +210,8 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If the server has reported shortly before that RM (forward drive) failed, RM is assumed to
-        have started the motors nevertheless, and the server is regarded as defective.
+        If RM (forward drive) has failed in the last STRAYS_S, the driver assumes that RM has
+        started the motors in spite of the failure, and regards the server as defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

@@ -16,7 +16,7 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 
 class ImuChecks(FailedStarts):
-    """The part of the pilot that checks the IMU."""
+    """The part of ``Pilot`` that checks the IMU."""
 
     def _check(self, now: float) -> Packets:
         """Return the request that checks the IMU; no packets while it must wait.
@@ -25,7 +25,8 @@ class ImuChecks(FailedStarts):
 
         * The check is not due.
         * A late reply could be mistaken for the reply to the check.
-        * After a short silence, no heading shows yet whether the server was restarted.
+        * The server was silent for a short time, and may have been restarted. The driver waits for
+          the next heading, which shows a restart.
         """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):

@@ -23,14 +23,15 @@ from omnibot_driver.core.mart.words import (
 PROVED_S: Final = 0.2
 """A motion starts only if the last successful check of the IMU is at most this old, in s."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""Usual duration of each check, in s.
+"""Usual duration of each check of the IMU, in s.
 
-If a check takes longer, the network is assumed to have delayed request and reply equally. Half of
-the additional time is then the age of the result when it arrives.
+If a check takes longer, the driver assumes that the network has delayed the request and the reply
+equally. So when the reply arrives, the age of the result is half of the time by which the check
+took longer than usual.
 """
 EARLY: Final = 4
-"""Number of successive checks, each with only a reply that came too early, after which the driver
-reports the server's fast replies."""
+"""Number of checks of the IMU in a row to which the server gives only a reply that is too fast for
+a check. After this number, the driver reports the fault to the user."""
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0

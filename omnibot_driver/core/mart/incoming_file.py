@@ -47,7 +47,11 @@ class IncomingFile:
 
     @property
     def order_is_sure(self) -> bool:
-        """Whether the lengths of the pieces show their order: at most one is a full piece."""
+        """Whether the lengths of the pieces show their order.
+
+        A full piece and the shorter last piece differ in length, but two full pieces do not. So at
+        most one piece may be full.
+        """
         return len(self._full) <= 1
 
     @property

@@ -26,12 +26,14 @@ If all bytes of the file have arrived, the driver waits for only a third of this
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn, while the robot is at rest.
 
-``RECORD_S``: wait for the reply to the request. Three average durations of a query are added.
+``RECORD_S``: wait for the reply to the request. The driver adds three average durations of a query
+to this time.
 
 ``RECORD_QUIET_S``: wait for each further piece of the file.
 """
 TIMES: Final = 3
-"""Largest number of times that the driver sends the request of a job in REPEATED."""
+"""Largest number of times that the driver sends the request of a job, if the job is in
+``REPEATED``."""
 
 CHECK: Final = "check controller and network"
 EXIT_LOST: Final = "if the server has ended, start it again; if it still answers, call again"
@@ -65,8 +67,8 @@ WORD_OF: Final[dict[Job, Word]] = {
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
 OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
-"""Jobs that the driver begins by itself. A job of the user can replace such a job before it is
-sent."""
+"""Jobs that the driver begins by itself. Until the driver has sent the request of such a job,
+another job can replace the driver's job."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs whose request may be sent again if the reply is missing."""
 COMPARED: Final = frozenset({Job.LAST_MOVE, Job.LAST_TURN})
@@ -141,10 +143,13 @@ class Jobs:
         return since if file is None else f"{since}, {file.came} of {file.size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job. It replaces a job that the driver itself began and has not sent yet.
+        """Begin a job.
 
-        Raises RequestRefused if another job is in progress, or if the server may have no log to
-        download.
+        If the driver itself began the current job, and has not sent its request yet, the new job
+        replaces the current one.
+
+        Raises RequestRefused if another job is in progress, or if the new job is to download the
+        log and the server may have no log.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -253,8 +258,8 @@ class Jobs:
     def cancel(self, why: str) -> None:
         """End the job as failed. ``why``: the reason, and after a semicolon what to do.
 
-        The driver's own jobs give no result. If the server has ended, the advice in ``why`` is
-        replaced.
+        A job that the driver itself began ends without a result. If the job has ended the server by
+        EXIT, the user gets other advice: to copy the file from the controller.
         """
         if self.job in OWN:
             self._clear()

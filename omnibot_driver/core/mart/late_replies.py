@@ -43,8 +43,8 @@ class LateReplies:
     def came(self, reply: Ok, now: float) -> None:
         """Record that ``reply`` is the late reply to an earlier request.
 
-        No other late reply of the same form is then expected. A copy of an earlier reply changes
-        nothing.
+        The driver then expects no other late reply of the same form. But if an identical reply has
+        come within the last ``delay_s``, ``reply`` may be a copy of it, and nothing changes.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
@@ -78,7 +78,11 @@ class LateReplies:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
-        """Record that the reply to ``word``, which was sent at ``sent_s``, may still come."""
+        """Record that the reply to a request may still come.
+
+        ``word``: the command of the request. ``sent_s``: time at which the request was sent. The
+        reply is expected within the longest duration of the command plus twice ``delay_s``.
+        """
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:
             self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
