@@ -15,9 +15,9 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Longest usual time in s without a report. If several tick reports arrive together after a longer
-time, the computer has read them late, and their times are corrected. ``BoardTime`` handles shorter
-delays.
+"""Longest usual time in s without a report. If no report comes for a longer time, and several tick
+reports then arrive together, the computer has read them late. The driver corrects the times of
+these reports. ``BoardTime`` handles shorter delays.
 """
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
@@ -114,7 +114,7 @@ class LateReads:
 
         A restart sets the board's clock and its tick counts to zero. The clock alone does not show
         a restart, because a clock in ns also wraps every 4.3 s. So the counts must have become
-        smaller, and must fit the short time that the clock shows.
+        smaller, and must fit the time since the clock's zero.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

@@ -53,9 +53,10 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether the time of the odometry is still that of the last estimate. When time passes,
-        the driver sets the wheels' ``blind`` flags, which mark motion without counted ticks, to
-        False. Until then, an odometry report in the same read can still correct this motion."""
+        """Whether the time of the odometry is still that of the last estimate. The wheels'
+        ``blind`` flags mark motion without counted ticks. The driver sets these flags to False when
+        time passes. Until then, an odometry report in the same read can still correct this motion.
+        """
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -336,8 +337,9 @@ class LoisOdometry:
     def _blind(self) -> bool:
         """Whether the ticks of at least one wheel do not show the wheel's motion.
 
-        The board counts no ticks of a wheel that is ``blind``. If a wheel still rolls backward
-        after its set-point has changed, the board counts the ticks as forward motion.
+        The board does not always count the ticks of a wheel (see ``Wheel.blind``). If a wheel still
+        rolls backward after its set-point has changed, the board counts the ticks as forward
+        motion.
         """
         return not self._motion.signed and any(
             wheel.blind or (wheel.rolls_on and wheel.rolls_on_s) for wheel in self._motion.wheels

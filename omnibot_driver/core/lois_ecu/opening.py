@@ -70,8 +70,8 @@ when ticks arrive, and on a bad line, too few ticks may arrive."""
 RESYNC: Final = b"::"
 """Characters between a line with a checksum and the next line, which has none. A board that expects
 no checksums keeps the surplus end of the first line, until a ``:`` begins a new line. Without these
-extra colons, the loss of two characters (the ``:`` of the second line, and one more) could join the
-end of the first line and the second line to a motion command."""
+extra colons, the loss of two characters (the ``:`` of the second line, and one more) could make a
+motion command of the surplus end and the second line."""
 
 
 class SettingsWriter:

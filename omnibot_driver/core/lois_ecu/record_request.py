@@ -57,8 +57,7 @@ def command_of(kind: RecordKind, samples: int) -> Command:
 
 
 class RecordRequest:
-    """Request for a record. ``kind``: kind of the requested record; None while none is requested.
-    """
+    """Request for a record. ``kind``: kind of this record; None while no record is requested."""
 
     def __init__(self) -> None:
         self.kind: RecordKind | None = None

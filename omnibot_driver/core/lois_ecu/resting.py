@@ -31,7 +31,8 @@ by at most ``REPORT_S`` for each report that arrives, so that earlier speeds are
 soon."""
 HIDDEN_PART: Final = 0.3
 """Rate of this module's clock while the board does not report the wheel's speed, as a fraction of
-real time. By this clock, earlier speeds are forgotten, so a slow clock keeps them for longer."""
+real time. The clock decides when an earlier speed is forgotten, so a slow clock keeps earlier
+speeds for longer."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)

@@ -24,8 +24,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
 """Longest period of the ticks, in ms, that each of the first ``ROUNDS`` rounds of settings writes.
-Each write restarts the period on the board, and so delays the next ticks. With a period of at most
-``FAST_TICKS_MS``, these rounds delay the ticks by less than 1 s."""
+Each write restarts the period on the board, and so delays the next ticks. With this period, the
+rounds delay the ticks by less than 1 s. A longer period is written in fewer rounds."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the left short correction in the public firmware after a boot."""
 

@@ -111,7 +111,8 @@ class ModeChange:
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
         """Return the command to send now to stop the robot, or None if no stop is needed.
 
-        The robot must stop before some changes of a mode or parameter (see ``stop_first``):
+        Before some changes of a mode or a parameter (see ``stop_first``), two commands stop the
+        robot:
 
         * First: Stop, until the robot is at rest, but at most for ``UNPROVED_S``.
         * Then: RPM 0/0, until ``cleared``. RPM 0/0 clears the RPM target. While the target is

@@ -39,11 +39,11 @@ contradict the counts too.
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which the driver assumes that wheels roll back between two tick reports.
+"""Longest time in s in which wheels are assumed to roll back between two tick reports.
 
-This limit applies if the driver knew the unit of the board's clock, and the new report contradicts
-this unit. From the time between the two reports, the driver computes how far the wheels may have
-rolled back. If more time has passed, the driver uses this limit instead of it.
+The driver computes from the time between two reports how far the wheels may have rolled back. If
+the driver knew the unit of the board's clock before the new report, but does not know the unit
+after this report, the driver uses at most this limit as the time.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.
@@ -157,8 +157,8 @@ class TickCounts:
     def _may_be_new(self, ticks: Ticks, fallen: int, duration_s: float, now: float) -> bool:
         """Return whether the new counts after a large decrease can be those of a restarted board.
 
-        ``fallen``: decrease in ticks, of the wheel whose count has decreased more. ``duration_s``:
-        time in s since the previous report.
+        ``fallen``: decrease, in ticks, of the count that has decreased more. ``duration_s``: time
+        in s since the previous report.
 
         The result is False in two cases:
 

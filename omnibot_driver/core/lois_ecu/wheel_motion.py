@@ -97,7 +97,8 @@ class Wheel:
 
         The motion is certain when the board measures a new speed, when the board restarts, when the
         speed controller is reset, and when the wheel starts. If the driver notices later that the
-        wheel has been at rest since then, it subtracts the distance that it has added since then.
+        wheel has been at rest since then, the driver subtracts the distance that it has added since
+        then.
         """
         self.begin_again()
 
@@ -124,10 +125,10 @@ class Wheel:
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """Time in s since the wheel's speed controller was last reset. The wheel may roll on for
-        some time.
+        """Time in s since the last reset of the wheel's speed controller.
 
-        ``rolled_mps``: speed of the wheel at this reset, in m/s.
+        After the reset, the wheel may roll on. ``rolled_mps``: speed of the wheel at the reset, in
+        m/s.
         """
         self.locked = False
         """Whether the wheel is at rest, and cannot start because its controller gives no power. The

@@ -21,9 +21,7 @@ FARTHEST_M: Final = 1000.0
 
 
 class Conductor:
-    """The actuator: it passes commands to ``pilot``, which sends one request at a time to the
-    server.
-    """
+    """The actuator: it passes commands to ``pilot``, which sends one request at a time."""
 
     rate_hz = 20.0
 

@@ -29,8 +29,8 @@ Only a working IMU reports the turn.
 SUPERVISED_S: Final = 1.0
 """Longest time in s in a backward drive (B) without an answer to a change of the motors' units.
 
-After this time, the driver sends ``CS 0 0``, a change of the units by zero. If the server answers
-``ok``, it still supervises the motion. If the server was restarted, the motors run on without
+After this time, the driver sends ``CS 0 0``, a change of the units by zero. An ``ok`` shows that
+the server still supervises the motion. If the server was restarted, the motors run on without
 supervision.
 """
 STARTED_M: Final = 0.01

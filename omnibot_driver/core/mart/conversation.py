@@ -47,10 +47,10 @@ SLOW_S, DISTURBED_S = 0.06, 5.0
 time, a reply may answer an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Urgent queries. The driver sends an urgent query even if a late reply to an earlier query may
-come.
+"""Urgent queries. The driver sends an urgent query even while the reply to an earlier query is
+late.
 
-The answer to the urgent query is then marked as doubtful.
+The driver then marks the answer to the urgent query as doubtful, because it may be the late reply.
 """
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})

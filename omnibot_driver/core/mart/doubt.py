@@ -122,11 +122,11 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the present constant heading error, because a motion begins.
+        """Store the constant heading error at the beginning of a motion.
 
-        While the driver computes a turn from the commands, the constant heading error grows. If the
-        server reports the heading during the motion, ``heading_told`` sets the error to the stored
-        value.
+        The constant heading error grows while the driver computes a turn from the commands. If the
+        server reports the heading during the motion, ``heading_told`` sets the error back to the
+        stored value.
         """
         self._bend_before_rad = self._levers[2][2]
 

@@ -13,9 +13,10 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import MCR, TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""Smallest measured distance or turn of a move that seems complete, as a fraction of the target.
+"""Smallest measured distance or turn of a complete move, as a fraction of the target.
 
-The target is the requested or the expected distance or turn, whichever is smaller.
+A move with a smaller distance or turn is regarded as incomplete. The target is the requested or the
+expected distance or turn, whichever is smaller.
 """
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.

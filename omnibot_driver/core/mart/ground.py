@@ -191,8 +191,7 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """Start time of a controlled move that the server is running, or may be running a second
-        time.
+        """Start time of a controlled move that the server runs, or may run a second time.
 
         A duplicated request causes the second run. The server reports no measurements during a
         move. The result is None if there is no such move.

@@ -148,8 +148,8 @@ class Health:
     def outlives(self) -> None:
         """Record that the stop port of the server may hang during the next motion.
 
-        The driver has used the stop port to end a motion, and only afterwards the server has
-        answered an earlier stop. So the stop port may still wait for the end of that motion.
+        The driver used the stop port to end a motion, and the server answered an earlier stop only
+        after that. So the stop port may still wait for the end of that motion.
         """
         self.outlived, self._may_be_restarted = True, False
 

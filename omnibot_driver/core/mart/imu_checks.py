@@ -26,7 +26,7 @@ class ImuChecks(FailedStarts):
         * The check is not due.
         * A late reply could be mistaken for the reply to the check.
         * The server was silent for a short time, and may have been restarted. The driver waits for
-          the next heading, which shows a restart.
+          the next heading, which shows whether the server was restarted.
         """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):

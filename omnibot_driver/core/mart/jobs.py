@@ -145,8 +145,8 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job.
 
-        If the driver itself began the current job, and has not sent its request yet, the new job
-        replaces the current one.
+        If the driver itself began the current job, and has not sent the request of the current job
+        yet, the new job replaces the current one.
 
         Raises RequestRefused if another job is in progress, or if the new job is to download the
         log and the server may have no log.

@@ -44,7 +44,8 @@ class LateReplies:
         """Record that ``reply`` is the late reply to an earlier request.
 
         The driver then expects no other late reply of the same form. But if an identical reply has
-        come within the last ``delay_s``, ``reply`` may be a copy of it, and nothing changes.
+        come within the last ``delay_s``, ``reply`` may be a copy of that reply, and nothing
+        changes.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
