@@ -20,16 +20,17 @@ from omnibot_driver.core.requests import Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Time in s for which the board must send data before a command to pause or to reset is repeated.
+"""Time in s after which a command to pause or to reset is repeated if the board still sends data.
 
-A paused board sends a «Paused» text every second. If the board sends only data for this time, the
-command was lost.
+A paused board sends a «Paused» text every second. If the board sends data for this time, and no
+such text, the command was lost.
 """
 FLOWING_S: Final = 0.1
-"""Longest interval between two reads, in s, that is added in full to the time ``PAUSE_RETRY_S``.
+"""Longest interval in s between two reads that counts in full as time with data.
 
-A running board sends every 10 ms. In a longer interval, the board may have sent nothing for some
-time, so only ``FLOWING_S`` is added.
+The time with data is compared with ``PAUSE_RETRY_S``. A running board sends every 10 ms. In an
+interval longer than this limit, the board may have sent nothing for some time, so only
+``FLOWING_S`` counts.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time in s that a command takes to the board, or that a message takes to the driver.
@@ -90,7 +91,11 @@ class ModeManager:
         self.answers: list[RequestDone] = []
         self._board = board
         self._wanted = self._wanted_before = Wanted.RUNNING if run else Wanted.ANY
-        """``_wanted_before``: the wanted mode before the last request."""
+        """``_wanted``: the mode that the board should be in.
+
+        ``_wanted_before``: this mode before the last request. If the board refuses a start,
+        ``_wanted`` becomes this mode again.
+        """
         self.output: Packets = NO_PACKETS
         """Packets to write before any others; see ``take_output``."""
         self._said_at = self._data_at = -math.inf
@@ -228,16 +233,18 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether this class can ignore data from a running board.
+        """Whether data from a running board change nothing here, because no change of mode is due.
 
-        This is so in the phase SETTLED, if no request is open and the wanted mode is not PAUSED.
+        The value is True in the phase SETTLED, if no request is open and the wanted mode is not
+        PAUSED.
         """
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float, *, estopped: bool) -> None:
         """Record that the board sends data and runs.
 
-        ``estopped``: whether the driver's e-stop is latched. The answer to a request says so.
+        ``estopped``: whether the driver's e-stop is latched. If it is latched, the answer to a
+        start request tells this to the user.
         """
         data_at, self._data_at = self._data_at, now
         if self.at_rest:

@@ -29,7 +29,7 @@ class MeanSpeeds:
         self._way_m = self._yaw_rad = 0.0
 
     def add(self, at_s: float, way_m: float, turn_rad: float) -> None:
-        """Add the displacement from the previous count to a new count.
+        """Record a new count, and the displacement since the previous count.
 
         ``at_s``: time of the new count.
         """

@@ -33,9 +33,10 @@ It is NOISE, plus NOISE_PART times the commanded units.
 
 
 class MotorLine:
-    """A line that a Kalman filter learns: the speed is ``slope * units + offset``.
+    """A motor's speed as a linear function of its motor units: ``slope * units + offset``.
 
-    Speed and offset are in nominal units. The argument ``slope`` is the initial slope.
+    A Kalman filter learns slope and offset. Speed and offset are in nominal units: at 10 motor
+    units, an ideal motor has the speed 10. The argument ``slope`` is the initial slope.
     """
 
     def __init__(self, slope: float = 1.0) -> None:
@@ -74,7 +75,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Lower the offset so that the line gives no speed at ``units``: the motor has not turned.
+        """Lower the offset to give no speed at ``units``, because the motor has not turned.
 
         An obstacle may be the cause, so the offset becomes as uncertain as at the beginning.
         """
@@ -82,9 +83,10 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Add ``slope`` and ``offset`` to the slope and the offset of the line.
+        """Add ``slope`` and ``offset`` to the learned slope and the learned offset.
 
-        If a motor was not measured, the caller changes its line like the line of the other motor.
+        The caller uses this method for a motor that was not measured by itself. The arguments are
+        then the changes that a measurement has made to the other motor's slope and offset.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
@@ -100,7 +102,7 @@ class MotorLine:
         self.__dict__.update(before.__dict__)
 
     def rescale(self, factor: float) -> None:
-        """Convert the learned line to new nominal units: multiply its speeds by ``factor``."""
+        """Convert what was learned to new nominal units: multiply all speeds by ``factor``."""
         if self._learned and factor != 1.0:
             self._ss, self._so, self._oo = (
                 each * factor * factor for each in (self._ss, self._so, self._oo)

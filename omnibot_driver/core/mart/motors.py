@@ -42,7 +42,10 @@ class Motors:
 
     @property
     def settings(self) -> MartSettings:
-        """The sizes and scales of the robot; may be replaced."""
+        """The sizes and scales of the robot.
+
+        When a parameter changes, the driver assigns new settings.
+        """
         return self._settings
 
     @settings.setter
@@ -74,7 +77,10 @@ class Motors:
         return _units(lines, self._spin_speed(rate_radps))
 
     def spun(self, units: int, rate_radps: float) -> None:
-        """Learn from a turn on the spot with ``units``. ``rate_radps`` is its mean rate."""
+        """Learn the motors' speeds from a turn on the spot in which both motors had ``units``.
+
+        ``rate_radps``: mean rate of the turn.
+        """
         if abs(rate_radps) > SLOWEST_TURN_RADPS:
             _learn_spin(self._lines, units, self._spin_speed(rate_radps))
 
@@ -83,7 +89,10 @@ class Motors:
         return copy.copy(self._right_line), copy.copy(self._left_line)
 
     def restore(self, lines: Lines) -> None:
-        """Forget what the driver has learned since the method ``lines`` returned ``lines``."""
+        """Restore the two MotorLines that the method ``lines`` returned earlier.
+
+        What the driver has learned about the motors since that call is forgotten.
+        """
         for line, before in zip(self._lines, lines, strict=True):
             line.restore(before)
 
@@ -96,9 +105,9 @@ class Motors:
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
-        """Return the ratio of the motors' speeds (left / right) if each motor has ``units``.
+        """Return the ratio of the motors' speeds (left / right) when both are set to ``units``.
 
-        The learnt ratio is limited to ``motor_balance`` ± MOST_UNEQUAL, because it can be wrong.
+        The learned ratio is limited to ``motor_balance`` ± MOST_UNEQUAL, because it can be wrong.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
@@ -138,7 +147,7 @@ def _learn_spin(lines: Lines, units: int, speed: float) -> None:
     """Learn from a turn on the spot in which both motors had ``units``.
 
     ``speed``: the mean of both motors' speeds. Slope and offset change by the same amounts in both
-    motor lines.
+    MotorLines.
     """
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2
@@ -148,5 +157,8 @@ def _learn_spin(lines: Lines, units: int, speed: float) -> None:
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:
-    """Return the units that an ideal motor needs at 1 V to turn by one encoder count per second."""
+    """Return the motor units that turn an ideal motor by one encoder count per second.
+
+    The result is for a battery voltage of 1 V.
+    """
     return abs(settings.metres_per_count) * settings.nominal_volts / settings.speed_per_unit

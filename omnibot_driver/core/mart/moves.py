@@ -128,9 +128,10 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn from a finished move how far the robot moves beyond the requested distance or turn.
 
-        After a straight move, learn at once from the wheel. After a turn, download the server's
-        record, and learn when the download has ended. If the network is bad, if no more records are
-        needed, or during another job, learn at once from the wheel after a turn too.
+        After a straight move, the driver learns at once from the wheel. After a turn, the driver
+        downloads the server's record of the turn, and learns when the download has ended. In three
+        cases, the driver learns at once from the wheel after a turn too: the network is bad, no
+        more records are needed, or another job is in progress.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -246,7 +247,7 @@ class Moves(Asking):
         return done.stopped_again and not (done.completed and no_time)
 
     def _stop_contradicted(self, done: Done) -> None:
-        """Discard the goal, because the right wheel shows another turn than the server reports."""
+        """Discard the goal, because wheel and server have measured different angles of a turn."""
         self.odometry.doubt_turn(done.asked - abs(done.turned_rad))
         if self._move is not None:
             self._move.fail()

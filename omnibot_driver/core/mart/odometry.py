@@ -21,7 +21,7 @@ SLOWING_S: Final = 0.12
 ACCELERATION_MPS2: Final = 1.0
 """Standard deviation of the acceleration since the last count, in m/s²."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
-"""Standard deviations of the errors of measured speeds, in m/s and rad/s."""
+"""Standard deviations by which the robot may be faster than measured, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
 """Standard deviations of speed and turn rate after the start of a motion, in m/s and rad/s.
 They apply until speed and turn rate are measured."""
@@ -37,7 +37,7 @@ class MartOdometry(Reckoning):
         """Return the odometry, predicted to ``now``.
 
         ``blind_since_s``: start time of a controlled move that is in progress, or that the server
-        may run a second time. None without such a move, and while the server is lost.
+        may be executing a second time. None if there is no such move, or if the server is lost.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

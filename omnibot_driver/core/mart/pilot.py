@@ -42,11 +42,12 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Time in s since the last voltage query (VOLTS), after which unanswered requests no longer delay
-the next VOLTS.
+"""Longest time in s since the last voltage query (VOLTS) for which unanswered requests delay the
+next VOLTS.
 
-In a turn on the spot, however long, the driver sends no VOLTS. So in the first STARTS_UP_S after a
-motion, unanswered requests delay VOLTS in any case (see ``_may_ask_volts``).
+In the first STARTS_UP_S (s) after a motion, unanswered requests delay VOLTS even after this time.
+The motion may have been a long turn on the spot, in which the driver sends no VOLTS (see
+``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -103,10 +104,11 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is busy, so that the driver expects no reply.
+        """Return whether the server is busy, so that the driver does not expect a reply.
 
-        If the server was already silent before the driver began to stop a drive, the result is
-        False, because the server may be lost.
+        The result is False if the server had already been silent for some time when the driver
+        began to stop a motion: the server may be lost. This rule does not apply to a controlled
+        move, in which every server is silent.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
@@ -230,8 +232,9 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        A reply since the last move excludes the duplicate, because the server is silent during a
-        move.
+        Two replies exclude the duplicate, because the server is silent during a move: an encoder
+        count that the server measured after the end of the move, and the answer to a HELLO that the
+        driver sent after the start of the move.
         """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free

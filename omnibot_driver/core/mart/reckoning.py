@@ -245,9 +245,10 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        Both are zero, except while the start command may have been lost. The pose then does not
-        contain the last encoder count. If this count is from after the start of the motion, the
-        server has counted from zero, and the pose lacks the motion that the count shows.
+        Both values are zero, except while the network may have lost the start command. While the
+        command may be lost, the pose does not include the last encoder count, because this count
+        may be from before the motion. If the server has received the command, it counts from zero,
+        and the pose lacks the motion that the count shows.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

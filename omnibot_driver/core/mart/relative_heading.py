@@ -17,7 +17,8 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """``ACCELERATION_RADPS2``: largest plausible angular acceleration of a robot, in rad/s².
 
-``MOST_RADPS``: largest plausible change of its turn rate, in rad/s.
+``MOST_RADPS``: largest plausible difference between its turn rate and the last measured rate, in
+rad/s.
 """
 OLD_RAD: Final = 0.01
 """Largest difference in rad between two headings that are regarded as the same heading.
@@ -42,9 +43,8 @@ class RelativeHeading:
     """The relative heading within a motion.
 
     * ``told_s``: time of the last accepted heading.
-    * ``from_s``: earliest time at which the last certain heading may have been measured. A changed
-      heading is uncertain if its reply may answer an earlier query (RMRA). Headings are otherwise
-      certain.
+    * ``from_s``: earliest possible time at which the server measured the last certain heading. A
+      heading is uncertain if it has changed and its reply may answer an earlier query (RMRA).
     * ``changed_s``: time of the last change of heading.
     * ``same``: number of equal headings since the last change.
     """
@@ -155,10 +155,14 @@ class RelativeHeading:
     def doubt_rad(self, angle_rad: float, at_s: float) -> float:
         """Return the standard deviation, in rad, of the turn since the last heading.
 
-        The result is zero unless the server may have restarted. A server that has restarted reports
-        a heading of zero, or on some servers the turn since the restart. So a heading near zero may
-        show a turn or a new zero point. If it certainly shows a new zero point, the result is
-        infinite.
+        The result is zero if the server cannot have restarted. A server that has restarted reports
+        a heading of zero or, on some servers, the turn since the restart. So if the server may have
+        restarted, the new heading ``angle_rad`` decides:
+
+        * The heading certainly has a new zero point: the result is infinite.
+        * The heading has changed, and is near zero, so that its zero point may be new: the result
+          is the size of the last heading plus the turn that is expected since then.
+        * In all other cases, the zero point is the old one, and the result is zero.
         """
         before_rad = self._angle_rad
         if not self.may_begin_anew or before_rad is None or at_s <= self.told_s:

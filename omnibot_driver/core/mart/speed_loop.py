@@ -22,9 +22,10 @@ The limit is small, because the network may duplicate a command. The server then
 twice.
 """
 MOST_BACKWARD: Final = 5
-"""Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
+"""Largest change of a motor's units by one command in a backward drive on a slow network.
 
-In such a drive, the driver does not notice that a command arrives twice.
+In all other drives, the limit is MOST_CHANGE. In a backward drive on a slow network, the driver
+does not notice that a command arrives twice.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
@@ -124,13 +125,15 @@ class SpeedLoop(Motors):
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
-        """Record that neither motor turns: the present units are too few.
+        """Record that neither motor turns, because the present motor units are too few.
 
-        ``units``: the units that both motors have; None for the current units of each motor.
+        ``units``: the units of both motors; None if each motor has the units that were last
+        commanded.
 
-        A motor with MOST_DEAD units or more that does not turn is blocked, so nothing is learned
-        from it. If ``units`` is None and a motor should certainly turn (``MotorLine.turns``), the
-        line of this motor stays unchanged, too.
+        If a motor has MOST_DEAD units or more, something blocks the motor, and the driver learns
+        nothing from it. If ``units`` is None and a motor should certainly turn
+        (``MotorLine.turns``), the MotorLine of this motor stays unchanged, and only the next start
+        gets more units.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -195,8 +198,8 @@ class SpeedLoop(Motors):
 
         The displacement also updates the heading error.
 
-        ``right_only``: whether only the right wheel was measured. The learnt line of the left motor
-        is then changed like that of the right motor.
+        ``right_only``: whether only the right wheel was measured. If so, the right motor's changes
+        of slope and offset (``MotorLine``) are also applied to the left motor.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad

@@ -27,18 +27,22 @@ OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 ``OFF_AGAIN``: at all other times. It is larger, because a new start disturbs the motion.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Limits of what the driver learns from slow turns, as fractions of the commanded rate.
+"""Limits of the rates that the driver learns from turns, as fractions of the commanded rate.
 
-``HELD``: lowest measured rate to learn from, after the first learned turn.
+``HELD``: after the first learned turn, the driver learns nothing from a turn with a lower measured
+rate, because something holds the robot.
 
-``LEAST_LESSON``: lowest rate that is learned, even if the measured rate is lower.
+``LEAST_LESSON``: if the driver learns from a turn with a lower measured rate, it learns this limit
+instead of the measured rate.
 """
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Fractions of the commanded rate that show that something held the robot in a turn.
+"""Limits of a turn's measured rate, as fractions of its commanded rate.
 
-A turn slower than HINDERED was held if the next turn is faster than TOO_FAST.
+The driver learns from a turn that is slower than HINDERED. If the next turn is faster than
+TOO_FAST, something held the robot in the slow turn, and the driver undoes what it learned from the
+slow turn.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
@@ -59,8 +63,9 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Terms of the largest plausible error of the angle in the reply to a stop command.
 
-The limit is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two
-queries. If the error is larger, the number may be an encoder count.
+This error is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn during two
+queries. If the angle differs more from the expected turn, the number in the reply may be an encoder
+count instead of an angle.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after an SSP request for which the server certainly keeps the speed that SSP has set.
@@ -80,7 +85,8 @@ class SpotTurns:
     * ``units``: motor units of the last turn, or those that SSP (the command for the speed of
       turns) has set for the next turn; 0 at the beginning of a connection.
     * ``seen_radps``: measured rate of the last turn, in rad/s.
-    * ``settings``: may be replaced.
+    * ``settings``: sizes and scales of the robot. The driver assigns new ones when a parameter
+      changes.
     """
 
     def __init__(self, settings: MartSettings, odometry: MartOdometry, loop: SpeedLoop) -> None:
@@ -196,7 +202,11 @@ class SpotTurns:
         return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
     def _is_held(self, seen_radps: float) -> bool:
-        """Return whether something holds the robot, so that the driver must not learn the rate."""
+        """Return whether the robot turns so slowly that something must be holding it.
+
+        The driver must not learn from this turn. ``seen_radps``: measured rate of the turn. The
+        result is False before the first learned turn.
+        """
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:

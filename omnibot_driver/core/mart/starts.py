@@ -32,11 +32,12 @@ from omnibot_driver.core.mart.words import Form, Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 NAME_WAIT_S: Final = 2.0
-"""Longest time in s for which the driver delays a controlled move, because an earlier HELLO may
-still arrive at the server after the move.
+"""Longest time in s for which the driver delays a controlled move, because a HELLO that was sent
+before the move may arrive at the server after the move.
 
-If the delay reaches this time, the driver sends the move nevertheless. An answer to HELLO then does
-not exclude a duplicate of the move.
+After a move, an answer to HELLO usually proves that no duplicate of the move is running. The answer
+to a HELLO from before the move would prove nothing. If the delay reaches this time, the driver
+sends the move nevertheless, and does not use answers to HELLO as this proof.
 """
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""
@@ -131,12 +132,12 @@ class Starts(ImuChecks):
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return whether ``start`` must wait, because an earlier HELLO may arrive after it.
+        """Return whether the command ``start`` must wait, because a HELLO may still be on its way.
 
-        Only a controlled move waits. An answer to HELLO after the move shows the driver that no
-        duplicate of the move is running. The answer to an earlier HELLO could show this falsely.
-        The wait ends after ``NAME_WAIT_S``. After a fresh check of the IMU, there is no wait,
-        because the driver has already waited before the check.
+        Only a controlled move waits. After a move, the server's answer to HELLO shows the driver
+        that no duplicate of the move is running. If a HELLO from before the move arrived after the
+        move, its answer could show this falsely. The wait ends after ``NAME_WAIT_S``. After a fresh
+        check of the IMU, there is no wait, because the driver has already waited before the check.
         """
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False

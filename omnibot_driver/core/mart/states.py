@@ -165,7 +165,7 @@ WHILE: Final[Mapping[Motion, State]] = {
     Motion.STRAIGHT: State.MOVING,
     Motion.TURN: State.MOVING,
 }
-"""The state of the robot in each motion, from the time at which the server has begun the motion."""
+"""For each motion: the ``State`` that applies while the server executes the motion."""
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:

@@ -39,7 +39,7 @@ STUCK: Final = (
 )
 HALF_STUCK: Final = (
     "one wheel does not turn: check its motor, wiring and power; forward motion is refused until"
-    " the command ends"
+    " you end the command or send a zero command"
 )
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Limits in m/s and rad/s. A robot whose measured speed or turn rate exceeds one of them certainly
@@ -49,11 +49,11 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel, which has no encoder, may turn unseen.
 
-``STUCK_S``: time before the driver stops a robot that does not seem to move. The left wheel may
-turn in this time if only the right wheel is stuck.
+``STUCK_S``: used when the robot does not seem to move. If only the right wheel is stuck, the left
+wheel may turn for this time before the driver stops the robot.
 
-``COASTS_S``: time after the driver has stopped the robot because a wheel is blocked. The server
-ends the measurement when the right wheel is at rest, but the left wheel may still coast.
+``COASTS_S``: used when the driver stops the robot because a wheel is blocked. The last encoder
+count shows that the right wheel is at rest, but the left wheel may still coast for this time.
 """
 
 

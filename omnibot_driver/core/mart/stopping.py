@@ -43,23 +43,26 @@ By then, the move has usually ended.
 
 SLOW_STOP: Final = (
     "the wheels still turned 0.6 s after the server's stop: the robot is heavy or fast, or rolls"
-    " down a slope, or the server has left a motor on; the driver continues"
+    " down a slope, or the server has left a motor on; the motors are off now, and the"
+    " driver continues"
 )
 NO_START_S: Final = 0.75
-"""Time in s from the start of a controlled turn (MCR, MCL) to the server's reply. If the reply
-comes later, a wheel has certainly turned.
+"""Limit in s of the time from the start of a controlled turn (MCR, MCL) to the server's reply. A
+later reply proves that a wheel has turned.
 
-If no wheel turns, the server gives up 0.6 s after the start. If a wheel turns, the server replies
-later: before its reply, it waits 0.75 s for the robot to stop.
+If no wheel turns, the server gives up and replies 0.6 s after the start. If a wheel turns, the
+server waits 0.75 s for the robot to stop, and replies after this wait.
 """
 
 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels did not stop in time.
 
-    The motors are off after this failure. After a controlled turn, the server may report wrongly
-    that the turn has not begun. If this report comes later than ``NO_START_S`` after the start, the
-    turn has certainly begun. The report then means that the wheels did not stop in time.
+    The motors are off after this failure. The server reports the failure in two ways:
+
+    * The reply says that the stop has timed out (``SLOW_STOPS``).
+    * The reply to a controlled turn says wrongly that the turn has not begun (``NO_START``). If
+      this reply comes later than ``NO_START_S`` after the start, the turn has certainly begun.
 
     ``lasted_s``: time from the start of the motion to the reply, without the transit times.
     """
@@ -83,10 +86,11 @@ class Stopping:
     ``planned``: whether the motion is stopped without a fault, only because another motion or a
     standstill is wanted.
 
-    ``rounds``: how often the stop was sent to the command port.
+    ``rounds``: number of times that the driver has sent the stop to the command port.
 
-    ``strange``: text of a failure that alone does not show the end of the motion; empty without
-    one. The text of an unknown answer takes precedence.
+    ``strange``: text of the last failure that the driver does not expect as a reply to a stop. If
+    there is none, the text of the first reply that no motion is in progress. Empty if there is no
+    such reply either.
     """
 
     def __init__(
@@ -197,10 +201,11 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        If there are at most ``owed`` doubtful replies, all of them may be late replies to earlier
-        requests, and the value is None. If there are more than ``owed``, the value is the last
-        doubtful reply with a plausible number. If no number is plausible, it is the last doubtful
-        reply.
+        A doubtful reply may also be late, or a copy. ``owed`` earlier requests are unanswered. If
+        there are at most ``owed`` doubtful replies, all of them may be late replies to these
+        requests, and the value is None. If there are more, the value is the last doubtful reply
+        whose number is plausible for a reply to the stop command. If no reply has a plausible
+        number, the value is the last doubtful reply.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -25,8 +25,8 @@ STRANGE_ROUNDS: Final = 6
 """Number of stop commands after which the driver reports an unexpected reply to a stop."""
 STRANGE: Final = (
     "the server answers a stop by '{}', so the driver does not know whether a motion is in"
-    " progress, and starts none; it expects 'fail no motion in progress' (SRM) and 'fail no motion'"
-    " (SM): check that the server is a MART controller, and update it"
+    " progress, and starts none; the driver expects 'fail no motion in progress' (SRM) and"
+    " 'fail no motion' (SM): check that the server is a MART controller, and update it"
 )
 NAMES: Final = {
     Motion.REFERENCE: "RM",
@@ -46,7 +46,8 @@ class Stops(StopReasons, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command, unless this motion is already refused until the command ends.
+        the user's command, except if the driver already refuses further motions of this kind until
+        the command ends.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """
@@ -187,14 +188,15 @@ class Stops(StopReasons, ABC):
         )
 
     def _outlives(self, reply: Reply, now: float) -> None:
-        """Detect a stop port that still waits for the end of the motion that it should stop.
+        """Detect whether the server's stop port still waits for the end of an old motion.
 
-        The stop port still waits if the server answers a stop command after the driver has used the
-        stop port. The port could then hang the next forward drive (RM); see
+        If the driver has used the stop port, and the server then answers ``ok`` to a stop, the stop
+        port still waits. The port could mistake the start of the next forward drive (RM) for the
+        end of the old motion. Nothing would then stop this drive; see
         docs/internals/mart_protocol.md.
 
         A reply with a number is ignored. It answers an earlier query, or the stop command of a turn
-        on the spot. Such a stop command leaves the stop port free.
+        on the spot. A stop command of a turn leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

@@ -20,15 +20,20 @@ RELEASE: Final = MSM.request()
 """The request that ends the direct control of the motors by MCS. Without MCS, it does nothing."""
 
 MOST_MISSES, MOST_MISSES_DISTURBED = 4, 8
-"""Number of unanswered requests after which the driver no longer tries to switch off the motors.
+"""Number of unanswered requests in a row after which the driver gives up switching off motors.
 
-The limits are for a server that does not answer MCS, which writes the motors' speeds.
-``MOST_MISSES_DISTURBED`` applies to a network that loses other replies, too. If a network loses one
-datagram of five, four exchanges in a row fail once in sixty times.
+The requests are MCS, which writes the motors' speeds, and MSM, which ends the effect of MCS.
+
+``MOST_MISSES``: limit in a network that answers other requests.
+
+``MOST_MISSES_DISTURBED``: limit in a network that loses other replies, too. The limit is higher,
+because the network may have lost all requests or replies: if the network loses one datagram of
+five, four requests in a row stay unanswered once in sixty times.
 """
 NO_MCS: Final = (
     "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"
-    " on after a straight move: if the robot creeps, send it a turn, or cut the motor power"
+    " on after a straight move: if the robot creeps, command a turn on the spot, or cut the"
+    " motor power"
 )
 
 
@@ -101,12 +106,12 @@ class SwitchOff:
         self.underway = word is MCS and self._supported
 
     def missed(self, word: Word, *, disturbed: bool = False) -> bool:
-        """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
+        """Record that MCS or MSM was not answered; return whether the driver gives up MCS now.
 
         After MOST_MISSES unanswered requests in a row (MOST_MISSES_DISTURBED in a ``disturbed``
-        network), the driver does not repeat the request, and allows motions again. If the last
-        request was MCS, the driver stops using MCS. It uses MCS again after the next connection, or
-        after a call of ``doubt``.
+        network), the driver does not repeat the last request, and allows motions again. If the last
+        request was MCS, the driver also gives up MCS until the next connection or a call of
+        ``doubt``. The result is True for the call that gives up MCS, and False for all other calls.
 
         The server may execute an unanswered MCS later. The server then refuses the next motion, and
         the driver sends MSM, which ends the direct control by MCS.

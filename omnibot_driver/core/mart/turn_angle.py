@@ -35,7 +35,10 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def forget(self) -> None:
-        """Reject records of the last turn from now on, because the odometry frame was reset."""
+        """Reject a later record of the last turn, because the odometry frame was reset.
+
+        The heading in the new frame does not include that turn.
+        """
         self._may_be_recorded = False
 
     def add(self, turn_rad: float) -> float:

@@ -54,9 +54,9 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last reported count while the network may have lost the start command, and 0 at
-    other times. The network may have lost the command if this count differs by at most 1 from the
-    last count before the command.
+    ``maybe``: a count that may be from before the start command or from after it; 0 if there is
+    none. It is the last reported count if it differs by at most 1 from the last count before the
+    command: the network may have lost the command.
     """
 
     def __init__(self) -> None:
@@ -88,11 +88,13 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        * The server has acknowledged the motion. Nothing changes, and the result is False.
-        * A count of the motion has come, without an acknowledgement. The motion had begun, so the
-          server was restarted. The pose already includes the counts of the motion.
-        * Neither an acknowledgement nor a count has come. The motion did not begin, and the count
-          continues from its value before the start command.
+        * The server has acknowledged the motion: nothing changes, and the result is False.
+        * The server has sent a count of the motion, but no acknowledgement: the motion had begun,
+          so the server was restarted, and the result is True. The pose already includes the counts
+          of the motion.
+        * The server has sent no acknowledgement and no count of the motion: the motion did not
+          begin, and the result is False. The count continues from its value before the start
+          command.
         """
         if self._confirmed:
             return False
@@ -170,7 +172,11 @@ class WheelCount:
         return Step(wheel_m, seconds, lost, unsure)
 
     def _odd_one(self, count: int, when: Moment, step: Step) -> Step | None:
-        """Accept the third implausible count in a row and return ``step``; else return None."""
+        """Reject an implausible count and return None, except for the third one in a row.
+
+        The third implausible count is accepted, because it is unlikely that three replies in a row
+        are wrong. The result is then ``step``, the step to this count.
+        """
         self._odd += 1
         if self._odd < ODD_TIMES:
             return None

@@ -186,7 +186,7 @@ WORDS: Final = (
 KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if text)
 
 NEVER_SAID: Final = {
-    "F": "RM drives forward as well, and can turn",
+    "F": "the driver uses RM instead, which drives forward and can also turn",
     "SDR": "limits a move that has no distance; the driver never starts such a move",
     "TFSFC": "undocumented; changes the distance from an obstacle at which the robot stops",
     "MNLV": "undocumented; reports a speed from calibration files; the encoder gives a better one",

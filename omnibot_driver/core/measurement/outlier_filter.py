@@ -28,12 +28,12 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 STILL: Final = 0.08
-"""Limit for spikes of the IMU, as a fraction of the spike's size.
+"""Limit by which the filter recognises spikes of the IMU, as a fraction of a change.
 
-* After a spike, the next reading differs from the reading before the spike by at most this
-  fraction. If it differs by more, the change was not a spike.
-* If a flipped bit has changed a value, all other values of the reading have changed by at most this
-  fraction of the flipped value's change.
+* A change of a reading is a spike only if the next reading returns to the reading before the
+  change. It may differ from that reading by at most this fraction of the change.
+* A change of one value is the flip of a bit only if all other values of the reading have changed by
+  at most this fraction of it.
 """
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
@@ -43,8 +43,11 @@ ALIKE: Final = 1.1
 because a line between them was lost, the filter does not compare the two displacements. Otherwise,
 even a steady motion would look like a change."""
 BACK: Final = 0.25
-"""The same limit as ``STILL``, for displacements: after a spike, the next displacement differs from
-the displacement before the spike by at most this fraction of the spike's size."""
+"""Limit by which the filter recognises spikes of displacements, as a fraction of a change.
+
+A change is a spike only if the next displacement returns to the displacement before the change. The
+two displacements may differ by at most this fraction of the change.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -83,13 +83,14 @@ class Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether one flipped bit can explain a change.
+        """Return whether one flipped bit can explain the change of a value.
 
         ``step``: size of the change. The readings vary, so the size may differ from the value of a
         bit by up to ``OUT_OF_PROPORTION`` times the largest recent change.
 
-        ``value``: magnitude after the change. At the end of the scale, the result is False, because
-        a knock against the robot can also cause such a value.
+        ``value``: magnitude of the value after the change. If it is at the end of the
+        accelerometer's scale, the result is False, because a knock against the robot can also cause
+        this value.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -42,8 +42,11 @@ class StreamStatistics:
     reads: int = 0
     """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum of delays in s: for each of the ``reads``, the age of its newest sample. Each stamp must
-    be later than the stamp before it, so an age may be a few microseconds below 0."""
+    """Sum of delays in s: for each of the ``reads``, the age of its newest sample.
+
+    The driver makes each stamp later than the stamp before it. A stamp can therefore be a few
+    microseconds later than the read, and the age is then below 0.
+    """
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0
@@ -54,12 +57,15 @@ class StreamStatistics:
     _sent_imu: int | None = field(default=None, repr=False)
     """Number of IMU readings that the board had sent before the last displacement; None if unknown.
 
-    If a later pose shows that displacements are lost, the IMU readings of these displacements are
-    added.
+    If a later pose shows that displacements were lost, this number grows by the number of IMU
+    readings that the board sends during these displacements.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
     _restarted: bool = field(default=False, repr=False)
-    """Whether a displacement since the last pose has shown a restart. The pose may show it too."""
+    """Whether a displacement since the last pose has shown a restart.
+
+    If the next pose also shows a restart, it is the same one, and is not counted again.
+    """
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:
         """Count the readings of one read. ``delay_s``: age of its newest sample, in s.

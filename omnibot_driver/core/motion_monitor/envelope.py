@@ -22,8 +22,8 @@ The ratio is above 1, because controllers overshoot, and users measure the board
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: deviation from the convex hull, in m/s and rad/s, that is always
-allowed.
+"""``NOISE_MPS``, ``NOISE_RADPS``: always allowed deviation from the convex hull of the recent
+set-points, in m/s and rad/s.
 
 The encoders' resolution and rounding can cause such a deviation. A slope can also cause it if the
 wheel controllers are slow.

@@ -247,10 +247,11 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
-        Stop is due when the following error exceeds its limit. If the robot continues to move, for
-        example because somebody pushes it, Stop is due again, after longer and longer times.
+        The following error is the sum of the motion that the set-points do not allow. Stop is due
+        when the following error exceeds its limit. While the robot continues to move, for example
+        because somebody pushes it, Stop is due again at longer and longer intervals.
 
-        ``begins``: whether the following error exceeds its limit now.
+        ``begins``: whether the following error exceeds its limit at this call.
         """
         if not self._error.outside:
             self._stood_s += seconds

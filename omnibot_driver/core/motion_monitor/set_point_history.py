@@ -31,8 +31,8 @@ FADING_S: Final = 0.2
 and after that a velocity that decays with this time constant. The value is long enough for robots
 with a time constant of up to 0.35 s."""
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point is ignored. The set-point then allows less than 2 % of
-the velocity that it has commanded."""
+"""Time in s after which a replaced set-point is ignored. At this time, the monitor allows a
+robot less than 2 % of the velocity of the replaced set-point."""
 UNKNOWN_S: Final = 0.8
 """Time in s, from the first known set-point on, for which the robot may still move because of
 unknown earlier commands."""

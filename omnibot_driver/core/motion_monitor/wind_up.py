@@ -40,7 +40,7 @@ BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
 """``BACK_MPS``, ``BACK_RADPS``: largest backward speeds of a held robot, in m/s and rad/s.
 
-Faster backward motion does not add to the wind-up.
+A robot that moves backward faster is not regarded as held, so its wind-up does not grow.
 """
 LEVER_M: Final = 0.15
 """Approximate distance in m of the wheels from the robot's centre. It converts a yaw rate to the
@@ -57,11 +57,12 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m that is added to the wind-up if the next displacement proves it.
+        """Distance in m by which a robot that seemed to be held fell behind its set-point.
 
-        After a long displacement in which the robot seemed to be held, this is the distance by
-        which it fell behind. The distance is proved if the robot is held in the next displacement
-        too. None: the robot was not held in the last displacement. 0: nothing is left to prove.
+        One long displacement does not prove that the robot was held. So this distance is added to
+        the wind-up only if the robot is held in the next displacement too. 0: the robot was held in
+        the last displacement, and its distance is already added. None: the robot was not held in
+        the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
@@ -97,10 +98,11 @@ class WindUp:
     ) -> None:
         """Add to the wind-up the distance by which a held robot falls behind its set-point.
 
-        If the robot is not held, the wind-up decays.
+        A robot is held if, for example, a hand or an obstacle makes it much slower than its
+        set-point. If the robot is not held, the wind-up decays.
 
-        ``motion``: mean twist during ``seconds``. The set-points must allow this twist; the caller
-        has checked this.
+        ``motion``: mean twist during ``seconds``. The caller has checked that this twist is within
+        the envelope of the set-points.
 
         ``newest``: set-points that the robot may still be approaching, the current one first.
 

@@ -53,11 +53,12 @@ class BoardFrame:
         self.pose = self.gate.proved = None
 
     def continues(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether a pose continues the board's frame, although its counter began anew.
+        """Return whether a pose continues the board's frame, although its pose counter began anew.
 
-        A counter begins anew if the board restarts, or after a damaged pose. A restart takes longer
-        than a period, so displacements are lost in it. The result is True if no displacement was
-        lost since the last accepted pose, and the pose is near the expected place.
+        The result is True if no displacement was lost since the last accepted pose, and the pose is
+        near the expected place. The counter of the poses begins anew if the board restarts, or
+        after a damaged pose. If the board had restarted, displacements would be lost, because a
+        restart takes longer than a period.
 
         ``gap``: covariance of the motion that was lost since the last accepted pose.
         """
@@ -72,7 +73,8 @@ class BoardFrame:
 
         ``told``: the pose that the board reports.
 
-        ``before``: the pose before the displacements that wait for a pose, computed from ``told``.
+        ``before``: the robot's pose before the displacements that wait for a pose. The caller has
+        computed it from ``told``, the pose after these displacements.
 
         ``confirmed``: whether ``told`` agrees with the last doubted pose.
 

@@ -52,9 +52,10 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` by the allowed part of this displacement.
+        """Move ``target``, the best known pose, by a displacement, and ``pose`` by a part of it.
 
-        ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
+        ``room_m``, ``room_rad``: largest distance and angle by which ``pose``, the published pose,
+        may move. ``pose`` moves by the part of the displacement that these limits allow.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
@@ -62,12 +63,12 @@ class CorrectionSmoother:
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Move ``pose`` towards ``target``, by a part of the correction.
+        """Move ``pose``, the published pose, a part of the way to ``target``, the best known pose.
 
         ``seconds``: duration of this step. The longer the step, the larger this part.
 
-        In each step, ``pose`` moves and turns at most as far as the robot could. This limit is for
-        the sum of two motions: first the displacement in ``move``, then the correction.
+        In each step, ``pose`` moves and turns at most as far as the robot could. The displacement
+        that the method ``move`` has applied in this step counts towards this limit.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

@@ -24,11 +24,11 @@ INITIAL_VARIANCE: Final = 1e-6
 UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
 """Variance of a direction of which nothing is known, in rad²."""
 ASTRAY: Final = 0.7
-"""Factor for the position errors that ``Astray`` adds."""
+"""Position error that ``Astray`` adds, in m per driven metre and per rad² of heading variance."""
 ASTRAY_RAD2: Final = 0.03
-"""Smallest variance of the heading, in rad², with which odometry adds the errors of ``Astray``.
+"""Variance of the heading, in rad², above which the odometry adds the errors of ``Astray``.
 
-Below it, the slip of the wheels causes larger errors.
+Below this limit, the slip of the wheels causes larger errors.
 """
 
 
@@ -106,7 +106,8 @@ class Covariance:
         """The covariance if the yaw is regarded as a direction, as in a quaternion.
 
         Whole turns do not change a direction. So the variance of the yaw is at most that of an
-        unknown direction. The covariances of yaw and position decrease by the same factor.
+        unknown direction. The covariances of the yaw with x and y decrease by the same factor
+        as the variance of the yaw.
         """
         if self.yaw_yaw <= UNKNOWN_YAW_VARIANCE:
             return self
@@ -139,12 +140,12 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 
 
 class Astray:
-    """Position errors that an uncertain heading causes, beyond those that are linear in its error.
+    """Position errors of an uncertain heading that are not proportional to the heading's error.
 
     There are two such errors: one along the motion, and one across it. The standard deviation of
     each error is a fraction of the driven distance. This fraction is ``ASTRAY`` times the variance
-    of the heading, but at most 1. So a way back cancels the errors of the way out, if the heading
-    has not become less certain in between.
+    of the heading, but at most 1. While this variance does not grow, all motions have the same
+    relative error. So a way back then cancels the errors of the way out.
 
     ``m2``: variance of x and of y, in m².
     """
@@ -152,14 +153,17 @@ class Astray:
     def __init__(self) -> None:
         self.m2 = 0.0
         self._along_m = (0.0, 0.0)
-        """Covariance of the position and the present error of the direction, if this error is a
-        random number with variance 1."""
+        """Covariances of x and y with the present error of the direction, in m.
+
+        The error of the direction is scaled to a random number with variance 1.
+        """
         self._rad2 = 0.0
 
     def move(self, dx_m: float, dy_m: float, rad2: float) -> None:
         """Add the errors of a displacement in the odometry frame.
 
-        ``rad2``: variance of the heading. If it has doubled, half of its error is new.
+        ``rad2``: variance of the heading. The larger this variance is than at the previous call,
+        the less the new errors depend on the earlier ones.
         """
         kept = min(1.0, self._rad2 / rad2)
         part = min(1.0, ASTRAY * rad2)
@@ -170,7 +174,7 @@ class Astray:
 
 
 class Uncertainty:
-    """The uncertainty of one odometry. ``noise`` may be replaced at any time."""
+    """The uncertainty of one odometry. The driver may replace ``noise`` at any time."""
 
     def __init__(self, noise: OdometryNoise) -> None:
         self.noise = noise
@@ -239,12 +243,13 @@ class Uncertainty:
     def halt(self, way_m: float, turn_rad: float) -> None:
         """Add the uncertainty of a robot that came to rest unseen, because its board restarted.
 
-        ``settle`` removes this uncertainty together with that of the gaps: a pose that continues
-        the old frame shows that the board has not restarted, and how the robot has moved. Unlike
-        ``gap``, this uncertainty does not increase the tolerance for poses.
+        ``way_m``, ``turn_rad``: mean distance and mean angle of the motion until the robot was at
+        rest. They are used as standard deviations. The variance of the angle is limited to that of
+        an unknown heading.
 
-        ``way_m``, ``turn_rad``: mean distance and angle in which the robot came to rest. The
-        variance of the heading becomes at most that of an unknown heading.
+        If a later pose continues the board's old frame, the board has not restarted, and the pose
+        shows how the robot has moved. ``settle`` then removes this uncertainty together with the
+        uncertainty of the gaps. Only the uncertainty of the gaps increases the tolerance for poses.
         """
         variance = min(turn_rad * turn_rad, UNKNOWN_YAW_VARIANCE)
         self._halt += Covariance.diagonal(way_m * way_m, variance)
@@ -254,9 +259,10 @@ class Uncertainty:
         self.gap = self._halt = NOTHING
 
     def bound(self, way_m: float, turn_rad: float) -> None:
-        """Replace the uncertainty of all gaps, because the error that they have caused is known.
+        """Replace the uncertainty of all gaps by the error that the gaps have caused.
 
-        ``way_m``, ``turn_rad``: this error, which is not corrected.
+        ``way_m``, ``turn_rad``: this error in m and rad. A pose of the board has shown it, but the
+        settings do not allow a correction.
         """
         self.gap = Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
         self._halt = NOTHING
@@ -264,7 +270,7 @@ class Uncertainty:
     def give_up(self) -> None:
         """Make the uncertainty of all gaps permanent, because the motion in them stays unknown.
 
-        A large turn in a gap makes the heading unknown, and no more.
+        The added variance of the heading is at most that of an unknown heading.
         """
         self._walk += (self.gap + self._halt).of_direction
         self.gap = self._halt = NOTHING
@@ -290,7 +296,10 @@ class Uncertainty:
 
 
 def _unheard_variance(acceleration: float, fastest: float, until_s: float, from_s: float) -> float:
-    """Return by how much the variance of a gap increases while the gap grows to ``until_s``."""
+    """Return by how much the variance of the motion in a gap grows while the gap gets longer.
+
+    ``from_s``, ``until_s``: duration of the gap in s, before and after it gets longer.
+    """
     before, after = (
         min(acceleration * duration_s * duration_s / 4, fastest * duration_s) ** 2
         for duration_s in (from_s, until_s)

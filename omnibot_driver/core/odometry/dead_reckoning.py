@@ -39,7 +39,7 @@ class DeadReckoning:
         self.last_stamp_s: float | None = None
 
     def integrate(self, reading: DisplacementReading, stamp_s: float) -> OdometryEstimate:
-        """Move the robot by a displacement, and by an assumed motion for those lost before it."""
+        """Move the robot by an assumed motion for lost displacements, then by this displacement."""
         frame, track = self.frame, self.track
         last_stamp_s, self.last_stamp_s = self.last_stamp_s, stamp_s
         heading_rad = None if frame.pose is None else frame.pose.yaw_rad
@@ -91,9 +91,9 @@ class DeadReckoning:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Add a motion (``tangent``, twist x time), in the board's body axes, to the odometry.
 
-        ``seconds``: duration of the motion, in s.
+        ``seconds``: duration of the motion in s, by the board's clock.
 
-        ``stamped_s``: time between the stamps before and after the motion, in s.
+        ``stamped_s``: duration of the motion in s, computed from the stamps before and after it.
         """
         self.track.move(tangent, seconds, stamped_s)
         self.frame.gate.passed(seconds)

@@ -64,11 +64,10 @@ class Odometry:
         self.configure(settings)
         self._backlog = PendingDisplacements()
         self._since_gap: Pose | None = None
-        """The pose that the board reports now if it began a new frame in the longest gap since its
-        last pose.
+        """The pose that the board would report now if it had begun a new coordinate frame in a gap.
 
-        None if no displacement was lost since this last pose, or if the robot was near the origin
-        of the old frame before the gap.
+        The gap is the longest one since the board's last pose. None if there is no gap since this
+        pose, or if the robot was near the origin of the old frame before the gap.
         """
         self._gap_lost = 0
         """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""
@@ -81,10 +80,10 @@ class Odometry:
 
     @property
     def refused_poses(self) -> int:
-        """Number of poses of the board that the odometry has refused.
+        """Number of poses of the board that the odometry has rejected.
 
-        It refuses impossible poses. It also refuses an unexpected pose if the next pose does not
-        confirm it.
+        The odometry rejects an impossible pose. It also rejects an unexpected pose if the next pose
+        does not confirm it.
         """
         return self._gate.refused
 
@@ -105,15 +104,17 @@ class Odometry:
         """Move the origin of the odometry frame to the robot's current pose.
 
         Return the estimates of displacements that were still waiting for a pose. Displacements that
-        waited for the board's first pose are discarded. If the next displacement ends a gap, and
-        most of this gap is older than the reset, the motion of the gap and of this displacement is
-        discarded too. The estimate is then at the origin, with an unknown twist.
+        waited for the board's first pose are discarded.
+
+        The reset may be in a gap, which ends with the next displacement. If most of the gap was
+        before the reset, the motion in the gap and in this displacement is discarded too. The
+        estimate of this displacement is then at the origin, with an unknown twist.
 
         If motion was lost before the reset, the board's heading is uncertain. The odometry then
         takes the heading from the board's next poses, as it did at the beginning.
 
-        ``now``: time of the reset in s, by the clock of the stamps. By default, the reset is at the
-        end of the present gap.
+        ``now``: time of the reset in s, by the clock of the stamps. With the default, infinity, the
+        whole gap was before the reset.
         """
         self.alignments += 1
         due = []
@@ -172,7 +173,10 @@ class Odometry:
         return estimates + self._release()
 
     def settle(self, reading: PoseReading) -> list[OdometryEstimate]:
-        """Use a pose of the board; return the estimates of the displacements that waited for it."""
+        """Process a pose of the board; return the estimates of displacements that waited for it.
+
+        If the settings allow it (``use_board_pose``), an accepted pose corrects the odometry.
+        """
         told = Pose(reading.x_m, reading.y_m, reading.yaw_rad)
         if not self._gate.possible(told):
             return []
@@ -243,10 +247,11 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether the pose is in a new frame of the board, which the odometry must adopt.
 
-        ``confirmed``: whether the pose agrees with the last doubted pose.
+        ``confirmed``: whether the pose agrees with the last unexpected pose.
 
-        While no frame is known, the result is ``confirmed``. Later, the odometry adopts another
-        frame only after a suspected restart of the board.
+        While no frame is known, the result is ``confirmed``. When a frame is known, and no restart
+        of the board is suspected, the result is False. When a restart is suspected,
+        ``BoardFrame.was_replaced`` decides.
         """
         frame = self._frame
         if frame.pose is None:
@@ -296,10 +301,10 @@ class Odometry:
     def _resume(self, told: Pose, lost_s: float) -> list[OdometryEstimate]:
         """Use a pose of the board to compute the motion of lost displacements.
 
-        The displacements that arrived after the loss have waited for this pose. They are published
-        now, too.
+        Displacements that arrived after the loss have waited for this pose. Their estimates are
+        returned.
 
-        ``lost_s``: duration of the gap in s. It is used only if no displacement is waiting.
+        ``lost_s``: duration of the gap in s. It is used only if no displacement has waited.
         """
         assert self._frame.pose is not None
         last_stamp_s = self._reckoning.last_stamp_s

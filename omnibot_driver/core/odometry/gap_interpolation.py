@@ -30,7 +30,8 @@ class GapInterpolation:
       If only poses arrive, ``last`` is the motion between two accepted poses, divided by the number
       of lost displacements.
     * ``missing``: number of displacements that were lost after the last displacement or accepted
-      pose. A pose has shown the loss. Each lost displacement was assumed to be like ``last``.
+      pose, as far as poses have shown the loss. The odometry assumes for each of them the motion
+      ``last``.
     """
 
     def __init__(self) -> None:
@@ -83,10 +84,11 @@ class GapInterpolation:
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted.
 
-        If all displacements since the previous accepted pose are lost, correct ``last``: it becomes
-        the mean motion per lost displacement.
+        ``way``: error of the assumed motion, as a tangent in body axes. It is the motion from the
+        previous accepted pose to this pose, minus the motion that was assumed for it.
 
-        ``way``: motion to the pose minus the assumed motion, as a tangent in body axes.
+        If all displacements since the previous accepted pose were lost, ``last``, the motion that
+        is assumed for each of them, becomes the mean motion per lost displacement.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last

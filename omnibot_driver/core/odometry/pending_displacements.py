@@ -58,10 +58,10 @@ class PendingDisplacements:
 
     @property
     def lost_s(self) -> float:
-        """Estimated duration in s of all displacements that ``lost`` counts.
+        """Estimated duration in s of the displacements lost before the first one that waits here.
 
-        Each of them counts with the duration of the first displacement that waits here. If this
-        duration is unknown, it counts as 0.
+        Each lost displacement is assumed to last as long as this first displacement. If the
+        duration of the first displacement is unknown, the value is 0.
         """
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
@@ -71,11 +71,12 @@ class PendingDisplacements:
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:
-        """Return the time in s without a report before the first displacement that waits here.
+        """Return how long, in s, the board reported nothing before the first waiting displacement.
 
-        If the duration of this displacement is known, the time is this duration times the number of
-        displacements that were lost before it. Otherwise, the time is counted from
-        ``last_stamp_s``, the stamp of the last report; it is 0 if this stamp is None.
+        If the duration of this displacement is known, the result is this duration times the number
+        of displacements that were lost before it. If its duration is unknown, the result is the
+        time from ``last_stamp_s``, the stamp of the last report, to its stamp. If ``last_stamp_s``
+        is None, the result is then 0.
         """
         if not self._waiting:
             return 0.0
@@ -104,9 +105,10 @@ class PendingDisplacements:
         return [reading for reading, _ in self._waiting]
 
     def before(self, board: Pose) -> Pose:
-        """Return the pose before all displacements that wait here, as if none had been lost.
+        """Return the pose before all displacements that wait here.
 
-        ``board``: the pose after all these displacements.
+        ``board``: the pose after all these displacements. The motion of lost displacements is
+        assumed to be zero.
         """
         start = Pose(
             yaw_rad=board.yaw_rad - math.fsum(reading.dyaw_rad for reading, _ in self._waiting)

@@ -47,10 +47,11 @@ class PoseGate:
         self._unproved_s = 0.0
 
     def displaced(self, reading: DisplacementReading, *, bridges: bool) -> None:
-        """Add a reported motion of the robot to the unconfirmed pose ``doubted``.
+        """Add a reported motion of the robot to ``doubted``, a pose that must still be confirmed.
 
-        ``bridges``: whether displacements that were lost before this motion are added too, each
-        as a repetition of this motion. If not, the caller adds them with ``bridged``.
+        ``bridges``: whether to add also the displacements that were lost before this motion. Each
+        of them is assumed to be equal to this motion. If ``bridges`` is False, the caller adds the
+        lost displacements with the method ``bridged``.
         """
         if self.doubted is None:
             return
@@ -60,9 +61,9 @@ class PoseGate:
         self.doubted = advanced(self.doubted, reading)
 
     def bridged(self, chord: Pose) -> None:
-        """Add the robot's motion during a gap to the unconfirmed pose ``doubted``.
+        """Add the robot's motion in a gap to ``doubted``, a pose that must still be confirmed.
 
-        ``chord``: the assumed motion during the gap, in the axes of ``doubted``.
+        ``chord``: the motion that is assumed for the gap, in the axes of the pose ``doubted``.
         """
         if self.doubted is not None:
             self.doubted = self.doubted.moved(chord)

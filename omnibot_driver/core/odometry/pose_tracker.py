@@ -27,8 +27,11 @@ class PoseTracker:
 
     def __init__(self, axis_signs: Signs) -> None:
         self.rolled = Pose()
-        """Sum of the tangents of all motions since the driver began. It is in the board's axes,
-        but corrected to true distances and turns."""
+        """Sum of the tangents (twist x time) of all motions since the driver began.
+
+        It has the board's axes, but true distances and turns: the board's distances and turns are
+        multiplied by the scales of the settings.
+        """
         self._axis_signs = axis_signs
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(OdometryNoise())
 
@@ -75,7 +78,7 @@ class PoseTracker:
         """Move along a tangent (twist x time). The motion took ``seconds``.
 
         ``stamped_s``: time in s from the stamp before the motion to the stamp after it. The
-        published pose moves at most as far as the robot can move in this time.
+        published pose moves at most as far as the robot can move in ``stamped_s``.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -115,16 +118,21 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def bound(self, tangent: Pose) -> None:
-        """Replace the uncertainty of all gaps until now.
+        """Replace the uncertainty of all gaps until now by the error that the gaps have caused.
 
-        ``tangent``: the error that the gaps have caused. A pose of the board has shown this error.
-        It stays in the odometry, because the settings do not allow a correction.
+        ``tangent``: this error. A pose of the board has shown the error. The error stays in the
+        odometry, because the settings do not allow a correction.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)
 
     def _part(self, tangent: Pose) -> Pose:
-        """Add a tangent to ``rolled`` and to the uncertainty; return it in REP-103's axes."""
+        """Return a motion in REP-103's axes, with true distances and turns; also record it.
+
+        The motion is added to ``rolled``, and its errors are added to the uncertainty.
+
+        ``tangent``: the motion (twist x time), as the board reports it.
+        """
         self.rolled += _times(tangent, self._size)
         signed = _times(tangent, self._signed_size)
         self.uncertainty.move(self.follower.target.yaw_rad, signed)

@@ -125,10 +125,10 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """The place in the stream of IMU frames at which the last read ended; None if unknown.
+        """How far the stream of IMU frames had arrived when the last read ended; None if unknown.
 
-        Bytes that are received but not decoded yet may be the beginning of an IMU frame. In this
-        case, the read ended within this frame.
+        If the last bytes of the read are the beginning of an IMU frame, the value describes a read
+        that ended within this frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -216,7 +216,10 @@ class OmniBot:
         self._translation.apply(Happening.HEARD_NOTHING)
 
     def stalled(self) -> None:
-        """Do nothing: after a stall, the driver stops the wheels; the board drives nothing else."""
+        """Do nothing after a stall of the driver, because this board drives nothing but the wheels.
+
+        The driver itself stops the wheels after a stall.
+        """
 
     def due(self, now: float) -> Packets:
         """Return no packets, because the board sends without polling."""
@@ -233,7 +236,7 @@ class OmniBot:
         """Do nothing: this board has no polls or subscriptions that the driver must end."""
 
     def actuator(self, proof: StopProof) -> SetpointStream:
-        """Return the stream of set-points, which encodes commands and repeats their frames."""
+        """Return the actuator of this board, which encodes each set-point and repeats its frame."""
         return SetpointStream(self._encoder, proof)
 
     def wake(self) -> Packets:
@@ -271,7 +274,7 @@ class OmniBot:
         return packed(transmission(frames.encode(frames.STOP), frames.RESET))
 
     def reset_given_up(self) -> None:
-        """Do nothing, because ``due`` does not repeat a reset."""
+        """Do nothing when the driver gives up a reset, because ``due`` never repeats a reset."""
 
     def stop(self) -> Packets:
         """Return the manual's Stop, which works in both positions of the board's control switch."""

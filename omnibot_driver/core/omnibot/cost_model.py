@@ -92,9 +92,10 @@ The cost is low, because a shock lasts several frames.
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
-"""Cost of an acceleration below 0.5 g that contains a word with the bytes of an IMU header.
+"""Cost of an IMU frame whose acceleration is below 0.5 g and contains the bytes of an IMU header.
 
-Such a frame is probably misread: what looks like its header is a gyro value of -6 of another frame.
+The decoder has probably misread such a frame. The bytes in the acceleration are the true header,
+and the bytes that were taken for the header are a gyro value of -6 of the frame before.
 """
 JUMP: Final = 2.5
 """Cost of a frame whose counter did not advance by one. The decoder then assumes that a frame was
@@ -131,8 +132,11 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which no delta is expected any more. This rule applies only while
-no delta is known: at the beginning of a stream, and after damage, until a delta arrives."""
+"""Number of missing deltas after which the decoder no longer expects a delta.
+
+This limit applies only while no delta is known: at the beginning of a stream, and after damage,
+until a delta arrives. The missing deltas are counted by the IMU frames that have arrived.
+"""
 
 
 class Context(NamedTuple):
@@ -281,8 +285,9 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may belong to the next header instead.
 
-    It may only if the byte occurs in headers. In an IMU frame, the byte must also be FF, or the
-    frame's last word must differ from the last word of the previous IMU frame.
+    The result is True only if the byte occurs in headers. For an IMU frame, one of two more
+    conditions must be true: the byte is FF, or the frame's last word differs from the last word of
+    the previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -83,9 +83,10 @@ class FrameDecoder:
         self.skipped: list[int] = []
         """Number of discarded bytes right before each frame that ``feed`` or ``flush`` returned."""
         self.at_rest = False
-        """Whether all received bytes are decoded, and the line normally pauses only between frames.
+        """Whether all received bytes are decoded, and the recent pauses were between frames.
 
-        If this is true, the faster code in ``single_imu`` may decode the next bytes.
+        A pause is a time in which the line was idle. If the value is True, the faster code in
+        ``single_imu`` may decode the next bytes.
         """
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
@@ -240,10 +241,10 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of ``walk`` except the last two.
+        """Accept the frames of ``walk`` except the last two; always return False.
 
-        The bytes after the last frame are odd, so the last two frames are uncertain. Always return
-        False, which is the result of ``_walk`` if a frame is uncertain.
+        The bytes after the last frame are unusual, so the last two frames are uncertain. The caller
+        ``_walk`` returns False if a frame is uncertain.
         """
         believed = len(walk.frames) - 2
         if believed > 0:
@@ -300,9 +301,9 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield each supposed frame, and whether it is accepted; end at the first undecided frame.
 
-        A frame is decided if later bytes cannot change the decision. A frame that ends at the
-        position ``until`` or before is decided without waiting for later bytes. When the line is
-        closed and has carried only one frame, this frame is accepted if its content is usual.
+        A frame is decided if later bytes cannot change the decision, if it ends at the position
+        ``until`` or before, or if the line is closed. If a closed line has carried only one frame,
+        this frame is trusted if the cost of its content is below ``SPOKEN_AGAINST``.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0
