@@ -29,9 +29,10 @@ LARGEST_DRIFT: Final = 5e-4
 corrects a clock."""
 LARGEST_CORRECTION_S: Final = 0.4
 LASTING_DRIFT: Final = 1e-4
-"""Largest assumed drift between two clocks over a long time, in s per s: that of their crystals.
+"""Largest assumed long-term drift between two clocks, in s per s, caused by their crystals.
 
-NTP adds at most ``LARGEST_CORRECTION_S``, because it steps the clock if the error is larger.
+NTP can shift a clock gradually by ``LARGEST_CORRECTION_S`` (s) in addition, but steps a clock with
+a larger error.
 """
 CLOCK_RETREATS: Final = 10.0
 """Factor for the misfit of a message that seems too early for its sender.
@@ -40,9 +41,11 @@ If a message is too late, its misfit is the time by which it is late. If it is t
 is ``CLOCK_RETREATS`` times the time by which it is early.
 """
 ALIKE_S: Final = 0.02
-"""Difference of misfits (``_Sender.misfit_s``) in s up to which two senders fit a message equally.
+"""Largest difference, in s, between the misfits of two senders that fit a message equally well.
 
-The driver then chooses the sender whose last message had the higher ``Arrival.number``.
+A misfit (``_Sender.misfit_s``) says how badly the time of a message fits a sender. If several
+senders fit equally well, the driver chooses the sender whose last message had the highest
+``Arrival.number``.
 """
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
@@ -76,9 +79,9 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: possible times, as time of day, at which the message was sent. The first time is
-      by our clock. The second time is by the sender's clock; it is left out when the offset of the
-      sender's clock is known.
+    * ``sent_ns``: possible times of day at which the message was sent. The first is an estimate by
+      our clock. While the offset of the sender's clock is unknown, the estimate may be wrong, so
+      the time by the sender's clock follows.
     """
 
     total_s: float
@@ -151,10 +154,9 @@ class Transit:
 
 
 class _Sender:
-    """One sender on a topic.
+    """A sender on a topic, with the offset of each of our two clocks from the sender's clock.
 
-    It stores two offsets from the sender's clock: that of our time of day, and that of our steady
-    clock.
+    Our two clocks are the time of day and the steady clock.
     """
 
     def __init__(self, differences_s: Differences, at_s: float) -> None:
@@ -170,10 +172,12 @@ class _Sender:
         return number is None or self.number is None or self.number < number
 
     def misfit_s(self, differences_s: Differences, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest possible misfit of a message to this sender, in s.
+        """Return how badly a message fits this sender: least and largest possible misfit in s.
 
-        The misfit is the time by which the message is too late, or ten times (``CLOCK_RETREATS``)
-        the time by which it is too early. Only limits are known, because the clocks drift.
+        The offset of the sender gives the expected arrival of the message. If the message is later,
+        the misfit is the time by which it is too late. If the message is earlier, the misfit is ten
+        times (``CLOCK_RETREATS``) the time by which it is too early. The drift of the clocks makes
+        the misfit uncertain.
         """
         misfits_s = [
             offset.misfit_s(difference_s, at_s)
@@ -190,10 +194,10 @@ class _Sender:
 
 
 class _Offset:
-    """The offset of one of our two clocks from a sender's clock.
+    """The offset of one clock of this computer (time of day or steady clock) from a sender's clock.
 
-    It is the smallest recent difference (arrival minus sending), and follows the drift of the
-    clocks.
+    The offset is the smallest recent difference (arrival minus sending). It follows the drift
+    between the two clocks.
     """
 
     def __init__(self, difference_s: float, at_s: float) -> None:
@@ -209,9 +213,10 @@ class _Offset:
         return difference_s - self._least_s - self._drift_s(at_s)
 
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
-        """Return the smallest and the largest possible misfit of a message, in s, by this offset.
+        """Return how badly a message fits this offset: least and largest possible misfit in s.
 
-        ``_Sender.misfit_s`` defines the misfit, and combines the results of its two offsets.
+        ``_Sender.misfit_s`` defines the misfit, and combines the results of the sender's two
+        offsets.
         """
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS

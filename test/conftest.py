@@ -58,10 +58,11 @@ WAITING = ("faults", "system", "tools")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Order the test files for parallel workers: the longest first, then two kinds by turns.
+    """Order the test files for parallel workers.
 
-    Tests that wait in real time alternate with computing tests, so that their drivers have enough
-    processor time.
+    The longest test files come first. Then files with tests that wait in real time alternate with
+    files with tests that compute, so that the drivers in the waiting tests have enough processor
+    time.
     """
     if not hasattr(config, "workerinput"):
         return

@@ -65,13 +65,16 @@ class Transport(Protocol):
         """
 
     def write(self, packets: Packets) -> None:
-        """Write all packets. A missing line gets only the bytes that it accepts at once.
+        """Write all packets.
+
+        A blocked line is regarded as missing, although its port is still open. This port gets only
+        the bytes that it accepts at once.
 
         Raises LinkError, and discards all unsent bytes, if the connection is lost.
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write only the bytes that are accepted without waiting; return their number."""
+        """Write only the bytes that are accepted without waiting; return how many were accepted."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, if this kind of port allows it."""

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds out whether the name of a silent host still has the address in use.
+"""Finds out whether a silent host has left the address to which the driver sends.
 
-A host may return with another address, for example from DHCP.
+A host may return with another address, for example from DHCP. So the driver looks up the name of a
+silent host again.
 """
 
 import contextlib
@@ -18,9 +19,10 @@ least time between two such lookups."""
 
 
 class HostName:
-    """The name of a host, and whether the host has left the address ``in_use``.
+    """The name of a host, and whether the name no longer leads to the address ``in_use``.
 
-    A lookup can take long, so it runs in its own thread, and only one runs at a time.
+    ``in_use``: the address to which the driver sends. A lookup of the name can take long, so each
+    lookup runs in its own thread. Only one lookup runs at a time.
     """
 
     def __init__(self, name: str, in_use: str) -> None:

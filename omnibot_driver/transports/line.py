@@ -67,8 +67,9 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
 
-        If the line is missing, but its port is open, the port gets only the part of ``data`` that
-        it accepts at once. The result is then True.
+        The result is True if the line is already regarded as missing. A missing line may still have
+        an open port, for example if it was blocked. This port gets only the part of ``data`` that
+        it accepts at once.
         """
         if self.port is None:
             return True
@@ -81,9 +82,10 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if bytes have waited for 0.2 s without a break.
+        """Write the waiting bytes; return False if bytes have been waiting continuously for 0.2 s.
 
-        All unsent bytes are then discarded.
+        Bytes that are added meanwhile do not begin the 0.2 s anew. If the result is False, all
+        unsent bytes are discarded.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

@@ -40,8 +40,9 @@ class Several:
     def __init__(self, lines: Sequence[tuple[str, Opener]], retry_s: float = RETRY_S) -> None:
         """Open the lines, each given as the name of its device and its opener.
 
-        Raises LinkError if no line can be opened, if another program uses the leading line, or if a
-        line does not support ``poll``.
+        Raises LinkError if no line can be opened, or if a line does not support ``poll``. Also
+        raises LinkError if another program uses the leading line: the line whose device has the
+        first path in alphabetical order.
         """
         self._retry_s = retry_s
         self._names = [name for name, _ in lines]
@@ -69,9 +70,10 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Descriptors of all lines, by channel; None for a missing line.
+        """Descriptors of all lines, by channel, for the guard process to copy.
 
-        The guard process copies them. A copy for a missing line would prevent its reopening.
+        A missing line has None, because a copy of its descriptor would prevent the reopening of the
+        line.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -98,8 +100,9 @@ class Several:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
         Raises LinesChanged if a line was lost or reopened. Raises LinkError if all lines are
-        missing. Also raises LinkError if another program uses the leading line, and this object has
-        never opened the line.
+        missing. Also raises LinkError if another program uses the leading line, and the leading
+        line has never been open before. The leading line is the line whose device has the first
+        path in alphabetical order.
         """
         if not self._ready:
             if not self._changed:  # the guard process may still have a copy of a line just lost
@@ -146,7 +149,10 @@ class Several:
             self._wake_up.ring()
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write to each line only the bytes that it accepts at once; return their number."""
+        """Write to each line only the bytes that it accepts at once.
+
+        Return the number of written bytes, over all lines.
+        """
         with self._writing:
             return sum(
                 line.port.write_if_room(((0, data),))

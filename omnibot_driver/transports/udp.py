@@ -176,7 +176,7 @@ def check_address(url: str, channels: int = 1) -> None:
 
 
 def _is_silence(error: OSError) -> bool:
-    """Return whether the error only means that the host does not listen at present."""
+    """Return whether the error only means that the addressed host does not listen at present."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
+"""Models of how a USB adapter delivers the bytes of a line.
 
-The delivery does not depend on the frames. All times are in s.
+An adapter delivers all bytes of a board's tick at once, or pieces of up to 16 bytes, or packets
+that a timer ends. The delivery does not depend on the frames. All times are in s.
 """
 
 from collections.abc import Callable, Iterator

@@ -36,7 +36,7 @@ from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
 BESIDE: Final = (0, 2, 4)
-"""Numbers of other busy processes. The delays are measured once with each of these numbers."""
+"""How many other processes keep the computer busy: one measurement for each of these values."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
@@ -110,9 +110,10 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return how long the driver takes to relay each angle, in ms, as a sorted list.
+    """Return the times that the driver takes to relay the angles, in ms, as a sorted list.
 
-    Meanwhile, ``busy`` other processes compute. Angles of the first 3 s are left out.
+    ``busy``: number of other processes that compute during the measurement. Angles of the first 3 s
+    are left out.
     """
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:

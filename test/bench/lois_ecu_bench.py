@@ -85,7 +85,10 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with the floor, and an empty list of further rows."""
+    """Return figures that compare the driver with a minimal program (the floor), and no table rows.
+
+    The second value is an empty list, because only some boards have additional rows in the report.
+    """
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}

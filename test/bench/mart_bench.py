@@ -52,7 +52,10 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return figures that compare the driver with the floor, and an empty list of further rows."""
+    """Return figures that compare the driver with a minimal program (the floor), and no table rows.
+
+    The second value is an empty list, because only some boards have additional rows in the report.
+    """
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]

@@ -24,9 +24,9 @@ AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Publish each speed to all robots.
+    """Command all robots with the speeds in ``SPEEDS``, one speed after the other, again and again.
 
-    For each robot, record when each speed was first published.
+    For each robot, record the time of the first message with each new speed, and the speed.
     """
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)

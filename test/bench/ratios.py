@@ -30,7 +30,10 @@ class Figure:
 
     @property
     def ratio(self) -> float:
-        """Return the median ratio of the driver's value to the floor's value."""
+        """Return the median of the ratios of the driver's value to the floor's value.
+
+        The floor is the smallest program with the same output.
+        """
         return median(self._ratios)
 
     @property

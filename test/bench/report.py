@@ -2,9 +2,10 @@
 
 """The performance report, which ``make bench`` writes into docs/internals/performance.md.
 
-``--quick``: short measurements, to test that the program runs. Exit code 1: a goal is missed.
+The report compares the driver with the *floor*: the smallest program with the same output.
 
-The floor is the smallest program with the same output as the driver.
+``--quick``: short measurements, to test that the program runs. Exit code 1: a ratio of driver to
+floor is above its limit.
 """
 
 import argparse

@@ -20,7 +20,11 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core. In each measurement, driver and floor each get the same share."""
+"""Shares of one processor core. The driver and the floor are measured once with each share.
+
+The floor is the smallest program with the same output. In each measurement, the driver and the
+floor get the same share.
+"""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""
@@ -29,7 +33,10 @@ NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"
 STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
-"""Time in s to wait for a Stop after the last command, equally long for every share of a core."""
+"""Time in s for which a measurement waits for a Stop after the last command.
+
+This time does not depend on how much processor time the driver gets.
+"""
 
 
 class Group:

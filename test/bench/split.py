@@ -2,8 +2,9 @@
 
 """Timers that measure the processor time of each stage of the driver's reader.
 
-The driver's process imports this module first, and at its end writes the times in s, as JSON, to
-the file in the environment variable SPLIT. ``passed``: the time for which the reader ran.
+The driver's process imports this module first. At the end of the process, the module writes the
+times in s, as JSON, to the file that the environment variable SPLIT names. The key ``passed`` has
+the elapsed time for which the reader ran.
 """
 
 import atexit
@@ -27,9 +28,10 @@ within: list[float] = []
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Replace a method by one that adds its processor time in the reader's thread to ``stage``.
+    """Replace a method by one that also measures its processor time in the reader's thread.
 
-    The time of other stages that the method calls is left out.
+    The time is added to the total of ``stage``. If the method calls a method of another stage, the
+    time of this call is added only to the other stage.
     """
     method: Callable[..., Any] = getattr(owner, name)
 

@@ -77,9 +77,9 @@ class Relay:
                 self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
-        """Publish a message for all bytes that look like a frame, without checks.
+        """Publish messages for each group of bytes that looks like an IMU or delta frame.
 
-        Only the first number in a frame is decoded.
+        Nothing is checked, and only the first number of an IMU frame is decoded.
         """
         estimates: Estimates = []
         at, data = 0, self._begun + data

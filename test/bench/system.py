@@ -41,9 +41,10 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios of driver to floor, for each adapter; None means no limit.
+"""Largest allowed ratios of the driver's value to the floor's value, for each adapter.
 
-Order: median latency, 99th percentile of the latency, processor time, latency of cmd_vel.
+The floor is the smallest program with the same output. None means no limit. Order: median latency,
+99th percentile of the latency, processor time, latency of cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
@@ -120,9 +121,10 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return the rows of a table of the costs of the floor, of each relay, and of the driver.
+    """Return table rows that compare the costs of the floor, of each relay, and of the driver.
 
-    Each relay has one more task than the relay before.
+    The floor is the smallest program with the same output as the driver. A relay is a program
+    between the floor and the driver: each relay has one more task than the relay before.
     """
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:

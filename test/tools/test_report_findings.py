@@ -246,7 +246,7 @@ def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
     found = judge(beside(drive, OMNIBOT, MART))
     (odom,) = [one for one in found if one.text.startswith("The rate of odom")]
     assert odom.level is Level.NOTE
-    assert "is 12.50 Hz. The recording does not show what it should be." in odom.text
+    assert "is 12.50 Hz. The recording does not show the expected rate." in odom.text
     assert any("imu/data_raw is 100.00 Hz; it should be 100 Hz" in one.text for one in found)
 
 

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds a step of a clock during the recording, such as on a computer whose time was not set."""
+"""Finds the time during a recording at which a computer's clock stepped (changed suddenly).
+
+A clock steps, for example, if the computer starts with the wrong time and corrects it later.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -15,15 +18,19 @@ from omnibot_driver.tools.report.log import Log, Series
 LEAST_STEP_S: Final = 0.3
 """Smallest lasting change of the least delay, in s, that is regarded as a step of a clock."""
 FEWEST: Final = 10
-"""Number of messages before and after a step that show that the change lasts."""
+"""Smallest number of messages that must lie on each side of a step of a clock.
+
+With fewer messages on one side, the change of the delay is not regarded as lasting.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class ClockStep:
-    """A step of a clock.
+    """A step (sudden change) of a clock during the recording.
 
-    ``by_s``: change of arrival time minus timestamp. ``after_s``: time from the first message to
-    the step. ``recorders``: whether the recorder's clock stepped, and not the driver's clock.
+    * ``by_s``: how much the difference (arrival time minus timestamp) changed at the step.
+    * ``after_s``: time from the first message to the step.
+    * ``recorders``: True if the recorder's clock stepped, False if the driver's clock stepped.
     """
 
     by_s: float

@@ -86,9 +86,9 @@ def shown(log: Log) -> list[Pair]:
 
 
 def _sampled(series: Series) -> Series:
-    """Return the finite rows that have a timestamp, with timestamps by the recorder's clock.
+    """Return the rows with finite values and a timestamp, with timestamps by the recorder's clock.
 
-    The times of commands, states and e-stops are by the recorder's clock, too.
+    The recorder's clock is used because it also gives the times of commands, states and e-stops.
     """
     rows = series.only(series.finite & np.isfinite(series.stamp_s))
     return Series(rows.arrived_s, rows.stamp_s + series.other_clock_s, rows.values)

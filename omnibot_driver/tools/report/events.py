@@ -16,9 +16,10 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Age of a state, in s, after which a report of the state in /diagnostics shows a running driver.
+"""Time limit in s that helps to find out whether the driver ended during the log.
 
-If the last state is "disconnected", and there is no such report, the driver has ended.
+If /diagnostics reports the log's last state more than this time after the state began, the driver
+still ran. Otherwise, if this state is "disconnected", the driver has ended.
 """
 
 

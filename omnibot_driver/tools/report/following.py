@@ -24,8 +24,11 @@ Until then, the motors may still be changing their speed.
 CONSTANT: Final = 0.02
 """Relative change of a command up to which the command is regarded as constant."""
 REVERSED: Final = -0.5
-"""Ratio of measured to commanded motion below which a robot moves the wrong way, also if its
-commands were never constant."""
+"""Ratio of measured to commanded motion below which the robot is said to move the wrong way.
+
+The ratio is negative if the robot moves in the opposite direction. This limit also applies if no
+command was constant for long enough to compare the speeds.
+"""
 TOLD: Final = 0.05
 """Speed of a wheel's rim, in m/s, above which a command or a measurement is regarded as motion.
 
@@ -35,9 +38,12 @@ STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
 SUSTAINED_S: Final = 1.0
 SLOW_START_S: Final = 3.0
-"""Time in s for which a robot with two driving wheels may stand still although it is commanded to
-move: its front wheel may have to turn first, or its motors may start slowly. Successive standstills
-without a motion between them count together."""
+"""Time limit in s for standstills of a robot with two driving wheels that is commanded to move.
+
+Until the limit, the front wheel may still have to turn, or the motors may start slowly. Longer
+standstills are reported. The lengths of several standstills are added if the robot did not move
+between them.
+"""
 AFTER_STOP_S: Final = 1.5
 """Time in s within which the robot must come to rest after an e-stop, or after the last command has
 timed out."""
@@ -64,12 +70,18 @@ class Answer:
 
     @property
     def off(self) -> Mask:
-        """For each axis, whether the gain differs from 1 by more than ``TOLERANCE``."""
+        """For each axis, whether the gain differs from 1 by more than ``TOLERANCE``.
+
+        The gain is the measured motion divided by the commanded motion.
+        """
         return np.abs(self.gains - 1.0) > TOLERANCE
 
     @property
     def wrong(self) -> Mask:
-        """For each axis, whether the gain differs from 1 by more than slow motors can explain."""
+        """For each axis, whether the gain differs from 1 by more than slow motors can explain.
+
+        The gain is the measured motion divided by the commanded motion.
+        """
         clear = np.abs(self.gains - 1.0) > TOLERANCE + self.spread
         return np.asarray(clear | (self.gains < REVERSED))
 
@@ -121,7 +133,8 @@ def _constant(commands: Series, at_s: Array) -> Mask:
 def judge(log: Log) -> Iterator[Finding]:
     """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    Motion during an e-stop is reported, and, if the log has commands, motion without a command.
+    Also report motion during an e-stop. If the log has commands, also report motion without a
+    command.
     """
     yield from _despite_the_estop(log, twists(log))
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
@@ -200,10 +213,11 @@ def _sustained(times_s: Array, rows: Mask) -> list[Span]:
 
 
 def _without_slow_starts(stalls: list[Span], moves_s: Array) -> list[Span]:
-    """Return the ``stalls`` that are longer than a slow start (``SLOW_START_S``).
+    """Return the standstills in ``stalls`` that are longer than a slow start (``SLOW_START_S``).
 
-    Stalls count together if the robot does not move between them, so that a robot which never moves
-    is found although each of its drives is short. ``moves_s``: the times at which it moves.
+    The lengths of standstills are added if the robot does not move between them. So a robot that
+    never moves is found even if each command to move is short. ``moves_s``: the times in s at which
+    the robot moves as commanded.
     """
     groups = groupby(stalls, key=lambda stall: int(np.searchsorted(moves_s, stall.begin_s)))
     together = [list(group) for _, group in groups]

@@ -116,10 +116,12 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step, the index after the last step that can compensate it.
+    """Return, for each long step between two timestamps, the end of its group of steps.
 
-    Only steps before the next long step can compensate a long step. ``most``: largest number of
-    steps to consider, counted from the long step itself. ``wide``: indices of the long steps.
+    A group begins with its long step, ends before the next long step, and has at most ``most``
+    steps (at least one). The returned end is the index after the last step of the group. If the
+    steps after the long step are short enough to make up for it, no message is missing. ``wide``:
+    indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
@@ -194,7 +196,7 @@ def _rate(rate_hz: float, stream: Stream) -> Finding:
         return Finding(
             Level.NOTE,
             "Timing",
-            f"{figure}. The recording does not show what it should be.",
+            f"{figure}. The recording does not show the expected rate.",
             "Record /diagnostics too, while no other robot publishes on it.",
         )
     off = abs(rate_hz / stream.rate_hz - 1.0) > RATE_TOLERANCE

@@ -36,11 +36,11 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that a topic with this name may have.
+    """Return the roles that match the name of a topic, each with two values.
 
-    With each role: the namespace of the topic's robot, and whether the topic fits the role. A topic
-    fits if ``kind``, its message type, is right for the role. A topic such as ``~/state`` must also
-    belong to a node in ``drivers``.
+    The first value is the namespace of the topic's robot. The second value says whether ``kind``,
+    the topic's message type, is right for the role. For a topic such as ``~/state``, the second
+    value is True only if the topic also belongs to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

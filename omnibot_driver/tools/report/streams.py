@@ -33,9 +33,10 @@ class Stream:
     def promised(self, log: Log) -> "Stream":
         """Return this stream with the expected rate from the driver's diagnostics.
 
-        * One robot: the last rate in its diagnostics. If they have no rate, this stream's rate is
-          kept, but for a robot with two wheels the rate is NaN.
-        * Several robots: their common rate; NaN if the known rates differ, or if none is known.
+        * Diagnostics of one robot: the last rate in them. If they contain no rate, the expected
+          rate becomes NaN for a robot with two wheels, and stays unchanged for any other robot.
+        * Diagnostics of several robots: their common rate; NaN if the known rates differ, or if
+          none is known.
         """
         told = [rate_hz for status in log.diagnostics if (rate_hz := self._told(status))]
         if log.alone:
@@ -43,7 +44,10 @@ class Stream:
         return replace(self, rate_hz=told[0] if len({*told}) == 1 else math.nan)
 
     def _told(self, status: Status) -> float | None:
-        """Return the rate that a status says the topic should have; None if there is none."""
+        """Return the expected rate of the topic, in Hz, according to a status in /diagnostics.
+
+        Return None if the status contains no such rate.
+        """
         for key in self.rates:
             with suppress(KeyError, ValueError):
                 if (rate_hz := float(status.values[key].rpartition(" of ")[2])) > 0.0:

@@ -15,16 +15,20 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad above which the pose has jumped (a leap).
+"""``LEAP_M``, ``LEAP_RAD``: limits in m and rad that show a jump of the pose (a leap).
 
-They limit the difference between the change of the pose and the motion by the twist, from one
-message to the next. The driver's own corrections of odom are smaller.
+From one message to the next, the change of the pose is compared with the motion by the twist. If
+the difference is above a limit, the pose has jumped. The driver's own corrections of odom are
+smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Length in s from which the step between two messages is regarded as a gap. The twist does not
-show the motion in a gap."""
+"""Smallest time in s between two odometry messages that is regarded as a gap.
+
+The twists of the messages do not show the motion in a gap. So only a jump to the zero pose is found
+there.
+"""
 
 
 def moving(odom: Series) -> Mask:

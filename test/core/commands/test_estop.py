@@ -124,7 +124,10 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """A robot that speeds up after an e-stop does not cause the notice that advises ~/reset."""
+    """A user latches and releases the e-stop three times, and drives on after each release.
+
+    The board does not keep an emergency stop latched, so no notice advises ~/reset.
+    """
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)

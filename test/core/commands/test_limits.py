@@ -140,7 +140,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
-    """Infinity and NaN are refused in every position, and the message names ``cmd_vel``."""
+    """A cmd_vel with infinity or NaN in any place is rejected, and the message names cmd_vel."""
     values = [0.0, 1e308, -1.0]
     values[place] = bad
     with pytest.raises(CommandRefused, match=r"cmd_vel.*NaN or infinity"):

@@ -85,10 +85,10 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """A board restarts and boots for 0.4 s. The driver sends no motion frame after the boot.
+    """A board restarts and boots for 0.4 s, while the user commands motion.
 
-    After the boot, the board is paused. It could read a byte of a motion frame as the letter S
-    (start).
+    The driver sends its last motion frame before the boot ends. After the boot, the board is
+    paused, and could read a byte of a motion frame as the letter S (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()

@@ -116,7 +116,7 @@ def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
-    """Infinity and NaN are refused in x, in y and in yaw."""
+    """A goal with infinity or NaN in x, in y or in yaw is rejected."""
     for goal in ((bad, 0.0, 0.0), (0.0, bad, 0.0), (0.0, 0.0, bad)):
         with pytest.raises(CommandRefused, match="NaN or infinity"):
             bench.go_to(*goal)

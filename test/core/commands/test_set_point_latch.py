@@ -40,9 +40,10 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """Even just after a command, the e-stop is sent twice at once, then repeated without end.
+    """A user latches the e-stop just after a command. The driver at once sends the e-stop twice.
 
-    Each transmission is ES and Stop, because some firmware does not know ES.
+    Then the driver repeats the e-stop without end. Each transmission is ES and Stop, because some
+    firmware does not know ES.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -71,7 +72,10 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A node requests a thousand e-stops a second. The driver sends only 20, to spare the line."""
+    """A node requests the e-stop a thousand times in one second.
+
+    The driver sends the e-stop only 20 times in this second, to spare the line.
+    """
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001

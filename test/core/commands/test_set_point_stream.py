@@ -123,10 +123,11 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """After a letter, such as S (start), during a drive, the driver sends the command again.
+    """During a drive, the driver sends a letter such as S (start), and then the last command again.
 
-    Zeros are sent before a letter. If the last frame has lost its end, these zeros may complete it
-    to a wrong command. The repeated command replaces the wrong one.
+    The driver sends zeros before the letter. If the board has lost the end of the last frame, these
+    zeros may complete the frame to a wrong command. The repeated command replaces the wrong
+    command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

@@ -81,9 +81,9 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """At shutdown, the driver checks in silence that the robot stays at rest.
+    """At shutdown, the driver sends nothing for a moment, and checks that the robot stays at rest.
 
-    A bad line could turn any frame into a motion.
+    The driver is silent because a bad line could turn any frame into a motion.
     """
     bench = driving()
     left(bench)

@@ -76,7 +76,8 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
     """The driver reads nothing for 80 ms, and then reads the two boards one after the other.
 
-    A refusal names the computer as the cause until the front board is read.
+    Until the driver has read the front board, it refuses motion, and the refusal names the late
+    computer as the cause.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}

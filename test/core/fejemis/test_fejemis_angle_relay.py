@@ -27,7 +27,10 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether the angle is within 0.5° of −6°, −16° and so on, or of −60° to −69°."""
+    """Return whether the text of an angle to the right (a negative angle) may contain a 6.
+
+    The result is True within 0.5° of −60° to −69°, and within 0.5° of −6°, −16°, −26° and so on.
+    """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
@@ -46,10 +49,10 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """If a line with an angle loses two characters, the checksum usually detects this.
+    """If a line with an angle loses two characters, the checksum usually detects the loss.
 
-    It may miss the loss only in an angle to the right whose text contains a 6. The board then reads
-    an angle that is 0° to 10° to the left.
+    The checksum can miss the loss only if the angle is to the right (negative), and its text
+    contains a 6. The board then reads an angle of 0° to 10° to the left of straight ahead.
     """
     across = 0
     for angle_deg in EVERY:

@@ -237,7 +237,10 @@ def test_a_small_difference_is_written_after_a_start() -> None:
 
 @pytest.mark.slow
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
-    """Without checksums, a query that loses one or two characters never changes a setting."""
+    """The driver sends a query without a checksum, and the query loses one or two characters.
+
+    The remaining characters never form a command that changes a setting of the board.
+    """
     bench = nominal(Simulated(firmware=Firmware(sums=False)))
     bench.run(8.0)
     texts = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -289,7 +292,8 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """Motion is refused until the board has all settings that the user has set.
 
-    If the line of a setting is lost, the driver does not repeat it during a drive.
+    The line with a setting may be lost, and the driver repeats such a line only before a drive, not
+    during a drive.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

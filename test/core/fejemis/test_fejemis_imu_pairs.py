@@ -281,10 +281,10 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Lines of two samples are paired only if nothing in the stream shows the mistake.
+    """Lines are lost, repeated or late. The driver still pairs only lines of the same sample.
 
-    Lines are lost, repeated or late. The mistake is hidden if the first line of the pair is late,
-    the second is read less than 5 ms later, and no pose follows in the same read.
+    The only exception is a wrong pair that nothing in the stream shows: the first line of the pair
+    is late, the second line is read less than 5 ms later, and no pose follows in the same read.
 
     ``period_s``: period of the reads in s, which must differ from the period of the samples. If it
     is None, each line is read as soon as it arrives, except while the host is busy.

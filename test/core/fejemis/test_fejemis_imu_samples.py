@@ -34,9 +34,9 @@ def sampled(arrivals: list[float]) -> list[float]:
 
 
 def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken() -> None:
-    """Samples that waited for 6 s get their sampling times.
+    """IMU samples wait for up to 6 s, and are read together. The driver finds their sampling times.
 
-    All of them are late, so they must not change the phase of the sampling times.
+    The late samples do not shift the sampling times of later samples.
     """
     arrivals = [
         11.0 if 5.0 < 0.01 * number < 11.0 else 0.01 * number + 3e-4 for number in range(1500)
@@ -58,11 +58,11 @@ def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> 
 
 
 def test_an_early_sample_takes_back_no_more_lost_samples_than_it_must() -> None:
-    """The driver has counted several samples as lost, although they may only have been late.
+    """The driver has counted several samples as lost, although they were perhaps only late.
 
-    Then a sample seems to arrive before its sampling time, so fewer samples were lost. The driver
-    reduces the count of lost samples only as far as necessary. Otherwise the stamps would be
-    several periods too old.
+    Then a sample seems to arrive before its sampling time, because the count of lost samples is too
+    high. The driver reduces the count only as far as necessary. If the driver reduced the count
+    further, the stamps would be several periods too old.
     """
     imu, chance = ImuSamples("m/s^2"), random.Random(2)
     arrived_s, pose_s, errors = 0.0, -math.inf, []
@@ -153,9 +153,10 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return, for each published sample, the cycles of its gyro line and its acceleration line.
+    """Return, for each published sample, the control cycles in which the board sent its two lines.
 
-    The bench must be from ``numbered``. Each cycle is returned as its number divided by 1000.
+    The two lines are the gyro line and the acceleration line. Each cycle is given as its number
+    divided by 1000. ``bench`` must be a result of the function ``numbered``.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

@@ -179,9 +179,10 @@ def test_extra_fields_are_left_alone() -> None:
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line loses its end. The decoder discards it with the next line, as one fault.
+    """A line loses its end and runs into the next line. The decoder discards the joined lines.
 
-    A line with a wrong checksum is a fault, too.
+    The joined lines count as one fault, and the following line is decoded. A line with a wrong
+    checksum is a fault, too.
     """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"

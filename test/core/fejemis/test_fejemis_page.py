@@ -152,9 +152,9 @@ def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
 
 
 def test_no_row_is_of_something_else() -> None:
-    """Each command and each subscription in the tables is in the boards' help.
+    """The help texts of the boards list each command and each message in the driver's tables.
 
-    The only exception is ``sub``, the command that subscribes.
+    The only exception is ``sub``, the command that subscribes to messages.
     """
     drive, front = listed(DRIVE_HELP), listed(FRONT_HELP)
     assert SAID.keys() - {"sub"} <= drive[0] | front[0]

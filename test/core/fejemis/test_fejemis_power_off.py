@@ -40,9 +40,10 @@ def assert_still_refused(bench: Bench) -> None:
 
 
 def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
-    """A ~/start during an e-stop cancels a pending power off.
+    """A power off is pending, and the user calls ~/start during an e-stop.
 
-    The driver sends ``on``, which cancels the power off, but not ``start``.
+    The driver sends ``on``, so the power off is cancelled. The driver does not send ``start``
+    during the e-stop.
     """
     bench.estop(True)
     bench.session.request(Request.START, None, bench.now)
@@ -157,9 +158,11 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 def test_a_power_off_is_forgotten_if_both_boards_restart_and_come_back_in_the_other_order(
     bench: Bench,
 ) -> None:
-    """A power off is forgotten if both boards restart unseen and come back at exchanged ports.
+    """A power off is pending. Both boards restart unseen, and come back at exchanged ports.
 
-    The driver compares the time of each board with its earlier time at the other port.
+    The restart has cancelled the power off, so the driver allows motion again. To detect the
+    restart, the driver compares the time of each board with the board's earlier time at the other
+    port.
     """
     bench.close()
     bench.speaks = set()
@@ -276,8 +279,9 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """The delay of a power off is such that the checksum detects the loss of any two digits.
+    """The driver increases the delay of a power off until the loss of any two digits is detected.
 
-    The checksum of ``off 300`` would miss the loss of 3 and 0.
+    For example, it sends ``off 311`` instead of ``off 300``, because the checksum of ``off 300``
+    would not show the loss of 3 and 0.
     """
     assert whole_seconds(wanted_s) == seconds

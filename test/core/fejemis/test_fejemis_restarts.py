@@ -303,9 +303,9 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
-    """The driver accepts commands within 0.25 s after a stall of the computer.
+    """The computer stalls. At most 0.25 s after the stall, the driver accepts commands again.
 
-    Heartbeats have shown by then that no board has restarted.
+    By then, heartbeats have shown that no board has restarted.
     """
     bench = nominal()
     bench.run(2.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what the sensors of the Teensy boards measure, in SI units."""
+"""Tests of the readings of the Teensy boards' sensors, which the driver publishes in SI units."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, nominal
@@ -42,9 +42,10 @@ def test_all_sensors_are_told_in_si_units() -> None:
 
 
 def test_the_biases_are_subtracted_from_both_imu_topics() -> None:
-    """The driver subtracts ``gyro_bias`` and ``accel_bias`` from imu/data as from imu/data_raw.
+    """The driver subtracts ``gyro_bias`` and ``accel_bias`` from the samples on both IMU topics.
 
-    Regression: the samples with an orientation were published with the biases.
+    The topics are imu/data_raw and imu/data. Regression: the driver did not subtract the biases
+    from the samples on imu/data, which have an orientation.
     """
     bench = nominal()
     settings = SessionSettings(

@@ -56,11 +56,11 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
     ],
 )
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
-    """The odometry contains the whole motion of a drive during a stall of the driver.
+    """The driver stalls during a drive. The odometry then contains the whole motion of the drive.
 
-    If the driver does not notice the stall, it rejects the lines that are over 1 s late. The first
-    displacement after these lines covers several seconds. The driver does not reject this
-    displacement as implausible.
+    If the driver does not notice the stall, it rejects all lines that are more than one second
+    late. The first displacement after these lines covers several seconds, but the driver does not
+    reject this displacement as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -97,10 +97,10 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
-    """After a stall and a second late read, the published samples have their sampling times.
+    """The driver stalls, then reads late twice. The published samples have their sampling times.
 
-    Bytes are lost between the two reads. Only a sample between the lost bytes and the next pose is
-    not published.
+    The terminal loses bytes between the two late reads. Only a sample between the lost bytes and
+    the next pose is not published.
     """
     bench = nominal()
     bench.run(1.0)
@@ -118,7 +118,10 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 2.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """No sample gets a stamp from the time in which the terminal's full buffer lost bytes."""
+    """The driver stalls, and the terminal's full buffer loses bytes until the end of the stall.
+
+    No published sample has a stamp from the time in which bytes were lost.
+    """
     bench = nominal()
     bench.run(1.0)
     begin_s, before = bench.now, len(bench.imu)

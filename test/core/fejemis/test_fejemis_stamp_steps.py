@@ -17,7 +17,7 @@ from omnibot_driver.core.readings import ImuReading
 
 
 def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
-    """If two stamps differ only by a rounding error, the driver makes the second 1 µs later."""
+    """Two stamps differ by a rounding error. The driver sets the second 1 µs after the first."""
     stamped = StampedReadings()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     for stamp_s in (50_000.0, 50_000.000000000007):
@@ -30,9 +30,10 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 17])
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
-    """Stamps of a kind, in nanoseconds, always increase, even if a restart is read late.
+    """The boards restart, and the driver reads late. Stamps of each kind of message still increase.
 
-    The first lines after such a restart of the boards all have the time of the read.
+    The stamps are compared in nanoseconds. The first lines after such a restart all have the time
+    of the read.
     """
     chance = random.Random(seed)
     bench = Bench()

@@ -253,10 +253,11 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
-    """A reverse command that the driver has set to zero is not driven later.
+    """The motion monitor has stopped the robot twice. Then the user commands a motion backward.
 
-    The robot stays at rest after the user has set ``allow_reverse``. At the beginning of this test,
-    the motion monitor stops the robot twice. So the next reverse command is refused until ~/start.
+    The driver sets this command to zero, because ``allow_reverse`` is off. Then the user sets
+    ``allow_reverse``. The robot stays at rest, and the next reverse command is refused until
+    ~/start.
     """
     bench = nominal(limits=SpeedLimits())
     for _ in range(2):

@@ -171,10 +171,10 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """Stamps of extra readings must increase only within a kind.
+    """Stamps of extra readings must increase only among readings of the same kind.
 
-    If a stamp equals the last one of its kind, it becomes 1 µs later. A stamp before that of
-    another kind is not changed.
+    If a stamp equals the last stamp of its kind, it becomes 1 µs later. If a stamp is earlier than
+    the last stamp of another kind, it is not changed.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
@@ -183,9 +183,9 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """Old lines that waited before the port was opened are not regarded as a restart.
+    """Lines waited before the port was opened. The driver does not regard them as a restart.
 
-    The board's time then jumps ahead, and the clock follows.
+    After these old lines, the board's time jumps ahead, and the fitted clock follows the jump.
     """
     clock = TeensyClock()
     for n in range(20):

@@ -183,7 +183,9 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 
 
 class Rig:
-    """A simulated board and its driver, by default with ``HOST_GAINS``.
+    """A simulated board and its driver.
+
+    ``ours``: the driver's settings; None means ``HOST_GAINS``.
 
     ``estimates``: pairs of an estimated odometry and the robot's true pose.
 
@@ -191,7 +193,8 @@ class Rig:
 
     ``reads_s``: least and greatest time between two reads of the driver, in s.
 
-    ``own_periods``: whether the board keeps its own periods of the reports, if ``ours`` has none.
+    ``own_periods``: whether the board keeps its own periods of the reports if ``ours`` has no
+    periods.
     """
 
     def __init__(

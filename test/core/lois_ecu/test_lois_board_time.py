@@ -107,9 +107,9 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """After a jump of the board's clock, the delay of the next tick report is irregular.
+    """The board's clock jumps by 0.05 s or 0.2 s. The next tick report then has an irregular delay.
 
-    The delay differs by the jump, 0.05 s or 0.2 s, from its usual value of 0.
+    The delay, which is usually 0, differs by the jump.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -121,9 +121,9 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 
 
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
-    """If reads are often up to 0.1 s late, one more read that is 0.1 s late is not irregular.
+    """Reads are often up to 0.1 s late. One more read that is 0.1 s late is not irregular.
 
-    A read that seems 0.06 s early is irregular: late reads do not explain it.
+    A read that seems 0.06 s early is irregular, because late reads cannot explain an early read.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):

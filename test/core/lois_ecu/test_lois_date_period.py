@@ -37,10 +37,10 @@ class DeafBench(Bench):
 @pytest.mark.slow
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """The board has the right period of the date even if one of the lines with the period is lost.
+    """The driver sets the period of the date several times, and one of these lines is lost.
 
-    The driver sends this line several times after a request for one date, which ends the periodic
-    dates.
+    The board still has the right period. The driver sets the period again because its request for
+    one date ends the periodic dates.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -52,9 +52,10 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The driver confirms the board's settings, and keeps the user's period of the date.
+    """The driver confirms the board's settings, and the board keeps the user's period of the date.
 
-    The confirmation ends the periodic dates, so the driver sets the period again.
+    To confirm the settings, the driver requests one date. This request ends the periodic dates, so
+    the driver sets the period again.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

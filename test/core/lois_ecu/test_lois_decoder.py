@@ -310,9 +310,10 @@ def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None
 
 
 def test_half_an_odometry_group_of_zeros_is_not_a_report_of_ticks() -> None:
-    """The second half of an odometry group of zeros, read late, is not a report of ticks.
+    """An odometry group contains only zeros, and the driver reads its second half late.
 
-    Bug: ticks of zeros, with a clock of 0, showed a restart of the board.
+    The decoder does not regard this half as a tick report. Regression: a tick report of zeros, with
+    a clock of 0, showed a restart of the board.
     """
     ticks, odometry = Ticks(4317, 0, 0), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     decoder = LoisDecoder()

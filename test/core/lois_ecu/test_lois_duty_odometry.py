@@ -71,9 +71,9 @@ def test_a_report_just_after_a_stop_does_not_take_the_drive_back(*, own_periods:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_duty_of_the_other_sign_brakes_the_wheels(seed: int) -> None:
-    """A change from backward to forward duty brakes the wheels, and the odometry shows the braking.
+    """The motors are slower than the driver assumes, and the duty changes from backward to forward.
 
-    The motors are slower than the driver assumes.
+    The forward duty brakes the wheels, and the odometry shows the braking.
     """
     one = by_duty([(3.0, BACK), (3.0, PUSH)], seed, SLOW)
     assert one.way_m > 1.4

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reported speeds that a wheel does not have, and the heading that the board computes from them."""
+"""Tests that the odometry does not follow wrong speeds of a wheel in the board's reports.
+
+The board also computes a wrong heading from these speeds.
+"""
 
 import math
 
@@ -16,7 +19,10 @@ PERIOD_S = 0.15
 
 
 class Reports:
-    """The odometry of a robot with the public firmware. Each test invents the reports."""
+    """The driver's odometry for a robot with the public firmware, and the board's reports for it.
+
+    Each test invents the reports.
+    """
 
     def __init__(self) -> None:
         self.odometry = LoisOdometry(LoisEcuSettings())
@@ -85,10 +91,9 @@ def test_the_first_speed_of_a_wheel_that_starts_does_not_move_the_estimate(
 
 
 def test_the_turn_that_the_board_computes_for_a_pause_moves_no_wheel() -> None:
-    """The board computes a turn from the old speed of a wheel that is at rest.
+    """The right wheel starts while the board holds 11 RPM for the left wheel, which is at rest.
 
-    The odometry does not move this wheel. The board still holds 11 RPM for the left wheel when the
-    right wheel starts.
+    The board computes a turn from this old speed. The odometry does not move the left wheel.
     """
     reports = Reports()
     reports.order(-12, 12)

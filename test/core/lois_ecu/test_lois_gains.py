@@ -108,10 +108,10 @@ def test_no_line_follows_the_request_for_a_date_directly() -> None:
 
 @pytest.mark.parametrize("reads_s", [0.001, 0.01, 0.07])
 def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
-    """A setting is sent at least 15 ms after a Stop, unless the driver is called too seldom.
+    """A setting is sent at least 15 ms after a Stop, if the driver is called often enough.
 
-    Bug: the driver sent the low-pass setting directly after the first Stop. If fourteen characters
-    of these two lines were lost, the remaining ones could command full duty.
+    Regression: the driver sent the low-pass setting directly after the first Stop. If fourteen
+    characters of these two lines were lost, the remaining characters could command full duty.
     """
     points = SetPoints(HOST_GAINS)
     writer = SettingsWriter(HOST_GAINS, points)
@@ -130,12 +130,13 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
 
 @pytest.mark.parametrize("waited_s", [0.1, 5.0])
 def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
-    """A setting that waited for the end of a drive is sent at least 15 ms after the Stop.
+    """A setting that waited for the end of a drive is sent at least 15 ms after the last Stop.
 
-    If the writer is called only when the driver repeats Stop, every 50 ms, it sends the setting
-    half a second after the first Stop.
+    There is an exception: if the settings writer is called only just after each repeated Stop,
+    every 50 ms, it sends the setting 0.5 s after the first Stop.
 
-    Bug: a setting that had waited for more than half a second followed the Stop at once.
+    Regression: a setting that had waited for more than half a second was sent directly after the
+    Stop.
     """
     settings = LoisEcuSettings()
     points = SetPoints(settings)
@@ -159,11 +160,12 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 
 @pytest.mark.parametrize("with_sum", [True, False])
 def test_a_recovery_that_waited_for_a_stop_follows_it_after_a_pause(with_sum: bool) -> None:
-    """No date has arrived before the end of a long drive, so the driver restores the board's mode.
+    """No GPS date arrives in a long drive. After the Stop, the driver restores the board's mode.
 
-    It does so 15 ms after the Stop, and writes no setting together with the mode.
+    The missing date may mean that the board does not obey. The driver writes the mode 15 ms after
+    the Stop, and writes no setting together with the mode.
 
-    Bug: the mode followed the Stop at once.
+    Regression: the driver wrote the mode directly after the Stop.
     """
     settings = LoisEcuSettings(with_sum=with_sum)
     points = SetPoints(settings)

@@ -89,9 +89,9 @@ def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
 
 
 def test_if_every_read_is_late_the_times_do_not_drift() -> None:
-    """If every read is late, the last report of each read still gets the time of the read.
+    """Every read is late, and the board's clock is slow by 0.5 % for 20 min.
 
-    The board's clock is slow by 0.5 % for 20 min.
+    The last report of each read still gets the time of the read: the estimated times do not drift.
     """
     late_reads = listening()
     for number in range(2000):
@@ -102,9 +102,9 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 
 
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
-    """A report after a restart gets the last time before the restart plus the board's clock.
+    """The board restarts, and its clock begins at zero.
 
-    The clock begins at zero with the restart.
+    The estimated time of a later report is the last time before the restart plus the board's clock.
     """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)
@@ -219,7 +219,7 @@ def stalled_drives(
 
 
 def assert_described(results: list[tuple[float, float]]) -> None:
-    """Assert that the standard deviations describe the errors, each of them and on average."""
+    """Assert that each error, and the mean square of all errors, fits the standard deviations."""
     for error_m, stddev_m in results:
         assert error_m < max(0.06, 3.5 * stddev_m)
     assert fmean((error_m / stddev_m) ** 2 for error_m, stddev_m in results) < 4.0
@@ -275,9 +275,10 @@ def test_a_backlog_in_several_reads_leaves_the_pose_right(firmware: str, stall_s
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 2.5])
 def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
-    """The board restarts while the driver stalls, and the odometry stops with the robot.
+    """The driver stalls, and the board restarts. The robot stops, and so does the motion in odom.
 
-    The covariance covers the unknown time of the restart, in each phase of the board's timers.
+    The driver does not know the time of the restart. The covariance covers the resulting error, in
+    each phase of the board's timers.
     """
 
     def reboot(bench: Bench, since_s: float) -> None:

@@ -236,6 +236,9 @@ def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
 
 @given(st.binary(max_size=20))
 def test_what_is_not_a_line_is_refused_by_name(data: bytes) -> None:
-    """``decode_command`` accepts any bytes or raises FrameError, never another exception."""
+    """``decode_command`` gets any bytes, and returns a command or raises FrameError.
+
+    No other exception is raised.
+    """
     with suppress(FrameError):
         decode_command(data)
