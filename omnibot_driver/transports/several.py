@@ -100,9 +100,9 @@ class Several:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
         Raises LinesChanged if a line was lost or reopened. Raises LinkError if all lines are
-        missing. Also raises LinkError if another program uses the leading line, and the leading
-        line has never been open before. The leading line is the line whose device has the first
-        path in alphabetical order.
+        missing. Also raises LinkError if the leading line has never been open, and another program
+        uses this line. The leading line is the line whose device has the first path in alphabetical
+        order.
         """
         if not self._ready:
             if not self._changed:  # the guard process may still have a copy of a line just lost

@@ -27,9 +27,9 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Largest number that a simulated board writes into an IMU frame.
+"""Largest frame number in the IMU frames of the simulated boards.
 
-The number counts from 0 to ``TURN`` and back, again and again.
+The frame number counts from 0 to ``TURN`` and back, again and again.
 """
 NOISE = 997
 """Number of ticks after which the random noise of the gyro and of the acceleration repeats."""

@@ -18,8 +18,8 @@ LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
 """Time limit in s that helps to find out whether the driver ended during the log.
 
-If /diagnostics reports the log's last state more than this time after the state began, the driver
-still ran. Otherwise, if this state is "disconnected", the driver has ended.
+If /diagnostics reports the log's last state later than this time after the state began, the driver
+was still running. Otherwise, if this state is "disconnected", the driver has ended.
 """
 
 

@@ -24,7 +24,7 @@ Until then, the motors may still be changing their speed.
 CONSTANT: Final = 0.02
 """Relative change of a command up to which the command is regarded as constant."""
 REVERSED: Final = -0.5
-"""Ratio of measured to commanded motion below which the robot is said to move the wrong way.
+"""Ratio of measured to commanded motion below which the robot clearly moves the wrong way.
 
 The ratio is negative if the robot moves in the opposite direction. This limit also applies if no
 command was constant for long enough to compare the speeds.

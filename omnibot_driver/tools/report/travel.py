@@ -26,8 +26,8 @@ RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
 """Smallest time in s between two odometry messages that is regarded as a gap.
 
-The twists of the messages do not show the motion in a gap. So only a jump to the zero pose is found
-there.
+In a gap, the twists of the messages do not show the motion, so only a jump to the zero pose is
+found.
 """
 
 

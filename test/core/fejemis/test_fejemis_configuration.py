@@ -292,8 +292,8 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
     """Motion is refused until the board has all settings that the user has set.
 
-    The line with a setting may be lost, and the driver repeats such a line only before a drive, not
-    during a drive.
+    A line with a setting may be lost, and the driver sends a setting again only while the robot is
+    at rest.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the readings of the Teensy boards' sensors, which the driver publishes in SI units."""
+"""Tests of the sensor readings that the driver publishes for the Teensy boards, in SI units."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, nominal

@@ -298,7 +298,7 @@ def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None
 
     Real lines without a checksum are accepted after a few of them have come.
 
-    Bug: zero ticks became 57 ticks, because the checksum was read as a part of the value.
+    Regression: zero ticks became 57 ticks, because the checksum was read as a part of the value.
     """
     decoder = LoisDecoder(sum_required=False)
     heading, short = encode_report(Heading(0)), b":100000003b\n"

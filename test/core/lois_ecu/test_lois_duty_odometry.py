@@ -59,7 +59,7 @@ def test_the_covariance_of_a_drive_just_after_stops_includes_that_of_the_duty_sc
 def test_a_report_just_after_a_stop_does_not_take_the_drive_back(*, own_periods: bool) -> None:
     """A report that arrives while the wheels roll out after a duty drive does not undo the drive.
 
-    Bug: half of the distance disappeared from the odometry.
+    Regression: half of the distance disappeared from the odometry.
     """
     ours = LoisEcuSettings(drive_mode="duty")
     for step in range(10):  # the report comes at another time after each stop

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that the odometry does not follow wrong speeds of a wheel in the board's reports.
+"""Tests of the odometry with reports that contain wrong speeds of a wheel.
 
 The board also computes a wrong heading from these speeds.
 """
