@@ -15,9 +15,10 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""Largest errors in m and in rad that the rounding of deltas causes in the odometry.
+"""``ROUNDING_M``, ``ROUNDING_RAD``: limits for the odometry's rounding error, in m and in rad.
 
-The errors grow with each delta, until the next pose of the board corrects them.
+The error comes from rounded deltas. It grows with each delta, until the next pose of the board
+corrects the odometry. A larger error fails the test.
 """
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 

@@ -25,9 +25,10 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 
 
 class Line:
-    """A simulated board and the odometry from its frames. All readings of its IMU are zero.
+    """A line that can lose frames, from a simulated OmniBot board to the driver's odometry.
 
-    ``loses``: function that returns, for a frame's bytes and the time, whether the frame is lost.
+    All readings of the board's IMU are zero. ``loses``: function that returns, for a frame's bytes
+    and the time, whether the frame is lost.
     """
 
     def __init__(

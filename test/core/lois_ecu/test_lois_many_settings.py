@@ -72,10 +72,11 @@ def periods_written(bench: Bench, ticks_ms: int) -> int:
 
 
 def test_a_long_period_is_written_four_times() -> None:
-    """The driver writes a period of 0.5 s at least four times, because single lines may be lost.
+    """The user sets the tick period to 0.5 s, and the driver writes the period at least four times.
 
-    The ticks do not show such a loss: they may come every 0.4 s by the board's own setting, and the
-    driver cannot tell this interval from 0.5 s.
+    The board can lose single lines. The ticks do not show whether the board has lost this line:
+    they may come every 0.4 s by the board's own setting, and 0.4 s is too near to 0.5 s for the
+    driver.
     """
     bench = Bench("firmware", own_periods=True)
     bench.run(5.0)

@@ -71,7 +71,11 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
-    """A terminal mode that the user takes back refuses no motion, and the robot stays stopped."""
+    """The user sets a terminal mode, and takes it back before the driver has written it.
+
+    The driver has begun to stop the robot for the terminal mode. The robot stops and stays at rest,
+    and the driver no longer refuses motion.
+    """
     bench = Bench("documented")
     bench.drive_on(0.3, 1.0)
     configure(bench, GPS)
@@ -86,8 +90,8 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
     """The user sets a drive mode and a terminal mode, and then takes the terminal mode back.
 
-    The robot is still stopped, because the change of the drive mode needs it. Refusals then name
-    only the drive mode.
+    The driver goes on stopping the robot, because the drive mode can change only at rest. Until
+    then, the driver refuses motion, and names only the drive mode as the reason.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

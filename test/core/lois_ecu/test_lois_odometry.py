@@ -118,9 +118,9 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The displacements of all estimates add up to the driven distance, within 3 %.
+    """The wheels' displacements in all estimates add up to the driven distance, within 3 %.
 
-    Between two estimates, the pose moves at less than 1 m/s, with a tolerance of 3 cm.
+    From one estimate to the next, the pose moves by less than 3 cm plus 1 m for each second.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
@@ -155,9 +155,10 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
 def test_a_board_that_restarts_ends_the_motion_in_odom(
     firmware: Firmware, pair: tuple[int, int]
 ) -> None:
-    """The board restarts while the driver sends set-points.
+    """The board restarts during a drive, and the driver goes on sending set-points until a Stop.
 
-    The estimated pose moves as far as the robot, within 12 cm.
+    The estimated motion since the restart agrees with the true motion of the robot, within 12 cm
+    and 12°.
     """
     rig = settled(firmware)
     rig.order(*pair, 2.5)

@@ -69,9 +69,10 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """A robot starts backward just after a reconnect. The covariance stays finite.
+    """The driver reconnects, and the robot starts backward between the first two odometry reports.
 
-    The robot starts between the first two odometry reports of the new connection.
+    The driver knows the time from the first of these reports to the second, so the covariance of
+    its estimate stays finite.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)
@@ -100,9 +101,12 @@ def test_counts_that_a_reset_cleared_while_the_wheels_roll_out_are_no_backward_m
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """If tick counts are zero after a silence, the clock shows whether the board has restarted.
+    """The board is silent for a while, and its tick counts are then zero.
 
-    Otherwise, the wheels have rolled back.
+    * ``restarted`` is True: the board's clock has begun at zero. The driver counts a restart, and
+      the pose does not jump.
+    * ``restarted`` is False: the board's clock has gone on. The driver concludes that the wheels
+      have rolled back, and the pose moves back.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

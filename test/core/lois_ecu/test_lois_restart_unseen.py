@@ -105,9 +105,10 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 
 
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
-    """A restart just when the clock wraps is not noticed, and the covariance covers the error.
+    """The board restarts just when its clock wraps, and the covariance covers the odometry's error.
 
-    Wheels that rolled back would give the same clock and counts.
+    The driver does not notice the restart: wheels that roll back to their start would lead to the
+    same clock and the same tick counts.
     """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.3, 0.0)
@@ -122,9 +123,9 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
-    """Wheels that roll back until clock and counts are near zero are not taken for a restart.
+    """The wheels roll back until their tick counts are near zero just when the board's clock wraps.
 
-    ``late_s``: delay in s of a read at this time.
+    The driver does not take this for a restart. ``late_s``: how late a read at the wrap is, in s.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6
@@ -141,9 +142,11 @@ def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: floa
 
 @pytest.mark.slow
 def test_a_restart_before_the_first_drive_is_noticed() -> None:
-    """The board restarts while its counts are still zero. Only its clock shows the restart.
+    """The board restarts before its first drive, and the driver notices the restart by the clock.
 
-    Bug: the gains were not written again if ``ticks_period`` was about the period after a boot.
+    The tick counts do not show the restart, because they were still zero. Bug: after such a
+    restart, the driver did not write the gains again if ``ticks_period`` was about equal to the
+    period that the board uses after a boot.
     """
     periods_ms = {Stream.TICKS: 400, Stream.ODOMETRY: 400}
     settings = LoisEcuSettings(written={Setting.LEFT_KP: 0.5}, periods_ms=periods_ms)
@@ -180,10 +183,10 @@ def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
 
 @pytest.mark.parametrize("right", [-FAST_TICKS, FAST_TICKS])
 def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
-    """Wheels that roll back at 150 RPM, in duty mode, are not taken for a restart.
+    """The wheels roll back at 150 RPM, in duty mode. The driver does not take this for a restart.
 
-    Bug: counts that decreased at more than 110 RPM showed a restart. The heading went wrong by
-    radians, and commands were discarded.
+    Bug: the driver took each decrease of the tick counts that meant more than 110 RPM for a
+    restart. The heading went wrong by radians, and the driver discarded commands.
     """
     slow = [(-FAST_TICKS // 2, right // 2)]
     translation = fast_wheels(slow + [(-FAST_TICKS, right)] * 22)
@@ -193,5 +196,8 @@ def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
 
 
 def test_a_restart_of_a_board_with_fast_wheels_is_noticed() -> None:
-    """The board restarts while the wheels roll at 150 RPM. Its counts begin at zero."""
+    """The board restarts while its wheels roll at 150 RPM, and the driver notices the restart.
+
+    The tick counts begin at zero again.
+    """
     assert fast_wheels([(-596, -596), (2, 2)]).counts.restarts == 1

@@ -20,9 +20,10 @@ def told(*speeds_rpm: float, tuned: bool = False, every_s: float = GROUP_S) -> R
 
 
 def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
-    """The reported speed falls from 31 to 12 RPM. Then the board reports 12 RPM twice more.
+    """The board reports that a wheel's speed falls to 12 RPM, and then 12 RPM twice more.
 
-    This proves that the wheel is at rest.
+    The equal reports make the detector certain that the wheel is at rest: the board repeats the
+    last speed of a stopped wheel.
     """
     assert told(31, 28, 19, 12).chance == 0.0
     assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
@@ -30,9 +31,11 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """After a fall to 20 RPM, three more reports of 20 RPM prove that the wheel is at rest.
+    """The board reports that a wheel's speed falls to 20 RPM, and then 20 RPM three times more.
 
-    Two reports do not prove it, because a wheel seldom stops from so high a speed.
+    The equal reports make the detector certain that the wheel is at rest: the board repeats the
+    last speed of a stopped wheel. Two repetitions are not enough, because a wheel seldom stops
+    directly from 20 RPM.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
@@ -41,10 +44,11 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_a_high_speed_that_is_kept_for_long_after_a_fall_is_measured_wrong() -> None:
-    """The reported speed falls to 28 RPM. Many equal reports prove that the wheel is at rest.
+    """The board reports that a wheel's speed falls to 28 RPM, and then 28 RPM many times.
 
-    No rolling wheel is that steady. The board has measured the 28 RPM wrongly: a wheel does not
-    stop directly from such a speed.
+    The detector is certain that the wheel is at rest, because the speed of a rolling wheel is never
+    that steady. A wheel does not stop directly from 28 RPM, so the board has measured the 28 RPM
+    wrongly.
     """
     assert told(63, 60, 35, *[28] * 4).chance == 0.0
     assert 0.0 < told(63, 60, 35, *[28] * 6).chance < 1.0
@@ -61,12 +65,18 @@ def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """If the reported speed never fell, the wheel rolls, however often the speed is repeated."""
+    """The board reports 20 RPM more than fifty times, and has never reported a higher speed.
+
+    The detector assumes that the wheel rolls.
+    """
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """One report of 27 RPM among reports of 18 RPM, from a late tick, is not taken for a fall."""
+    """A late tick makes the board report 27 RPM once, among reports of 18 RPM.
+
+    The detector does not take the change from 27 to 18 RPM for the stop of a wheel.
+    """
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
@@ -88,10 +98,11 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """A fall from an estimated 28 RPM to a reported 14 RPM shows that the wheel is at rest.
+    """The board reports 14 RPM three times, after a pause in which the driver has estimated 28 RPM.
 
-    The board reports no speeds while both wheels have the same speed. Until the next report, the
-    driver estimates the speed.
+    The detector is certain that the wheel is at rest: the wheel has stopped during the pause, and
+    the board repeats the last speed. The board pauses its reports of the speeds while both wheels
+    have the same speed.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -102,9 +113,10 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 
 
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
-    """If most reports are lost, a fall that seems to take 1 s still shows that the wheel rests.
+    """Most reports are lost, so a wheel's speed seems to take 1 s to fall to 9 RPM.
 
-    The true fall may have been faster than the reports show.
+    The board then reports 9 RPM twice more. The detector is certain that the wheel is at rest,
+    because the speed may have fallen faster than the few reports show.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
@@ -121,9 +133,10 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """If most reports are lost, many equal reported speeds prove that a wheel rests.
+    """Most reports are lost, and all others report nearly the same speed of a wheel.
 
-    The reports show no fall of the speed, but the speed may have fallen between two of them.
+    After eleven equal reports, the detector is certain that the wheel is at rest. The speed may
+    have been higher in the lost reports, and the board repeats the last speed of a stopped wheel.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
@@ -134,7 +147,10 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """Reports that are late but not lost hide no fall: a constant speed shows a rolling wheel."""
+    """The driver reads some reports of a nearly constant speed late, but no report is lost.
+
+    The detector assumes that the wheel rolls, because no report of a higher speed can be missing.
+    """
     wheel = told(13, 13, 13)
     for _ in range(10):
         for since_s in (0.4, 0.0, 0.0):

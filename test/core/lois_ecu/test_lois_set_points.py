@@ -55,7 +55,11 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """``velocity`` encodes 0.2723 m/s as 20 RPM, and ``meaning`` decodes such a line to a twist."""
+    """``velocity`` encodes a twist as a line with two RPM values, and ``meaning`` decodes the line.
+
+    A twist of 0.2723 m/s straight ahead gives 20 RPM for each wheel. The decoded twist differs from
+    the encoded twist only by the rounding.
+    """
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -88,9 +92,10 @@ def encode_command_duty(left: int, right: int) -> bytes:
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """RPM 0/0 precedes each of the first three set-points after a Stop.
+    """The driver sends RPM 0/0 before each of the first three set-points after a Stop.
 
-    RPM 0/0 clears the measured speed of a wheel at rest, which otherwise might never start.
+    After a Stop, the board still uses the last measured speed of a wheel at rest, and might never
+    start the wheel. RPM 0/0 clears this speed.
     """
     ecu = started()
     drive = b":020014001438\n"
@@ -137,7 +142,10 @@ def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line:
 def test_slow_ticks_get_time_to_prove_the_standstill(
     periods_ms: dict[Stream, int], after_s: float
 ) -> None:
-    """RPM 0/0 ends the counting of ticks, so it waits for several tick reports after a Stop."""
+    """After a Stop, the driver waits for several tick reports before it sends RPM 0/0.
+
+    The tick reports can prove the standstill, and RPM 0/0 ends the counting of ticks.
+    """
     points = SetPoints(LoisEcuSettings(periods_ms=periods_ms))
     points.wrote(encode_command(SetRpm(20, 20)), 1.0)
     points.wrote(STOP, 5.0)

@@ -12,10 +12,11 @@ from lois_bench import FIRMWARE, Bench
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> Bench:
-    """Return a bench whose robot is at rest after a drive in which the connection was lost.
+    """Return a test bench after a drive with a lost connection, a second drive, and a stop.
 
-    * ``seconds``: how long the connection was lost.
-    * ``reopened``: whether the port was closed and opened again.
+    * ``vx``: speed of both drives, in m/s.
+    * ``seconds``: how long the connection is lost, in s.
+    * ``reopened``: whether the port is closed and opened again.
     """
     bench = Bench(firmware)
     bench.drive_on(vx, 4.0)

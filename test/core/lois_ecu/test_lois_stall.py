@@ -55,7 +55,7 @@ def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> No
 
 
 def test_wheels_that_tick_do_not() -> None:
-    """Both wheels are commanded forward and tick. No stall is reported."""
+    """Both wheels are commanded forward and tick. The driver reports neither wheel as stalled."""
     assert watched(SetRpm(20, 10), ticks=(3, 1), ways_m=0.0) == []
 
 
@@ -109,18 +109,19 @@ def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> N
 
 
 def test_a_few_equal_speeds_on_a_bad_line_do_not_show_a_stall() -> None:
-    """If most reports are lost, equal speeds in all reports of 3 s do not show a stall.
+    """Most reports are lost, and the board reports the same speed of a wheel for 3 s.
 
-    The wheel may have had other speeds between the reports.
+    The driver does not regard the wheel as stalled, because its speed may have been different in
+    the lost reports. After three more equal reports, the driver regards the wheel as stalled.
     """
     assert not looks_stalled([(-10, 8 + step % 3) for step in range(7)], every_s=0.5)
     assert looks_stalled([(-10, 8 + step % 3) for step in range(10)], every_s=0.5)
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """A wheel whose reported speed stays the same, above its set-point, looks stalled.
+    """The board keeps reporting one speed of a wheel, above its set-point. The wheel looks stalled.
 
-    The speed controller gives no power at such a speed, so the speed of a rolling wheel would fall.
+    Above the set-point, the speed controller gives no power, so a rolling wheel would slow down.
     """
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
@@ -129,7 +130,8 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
     """With feed-forward, a wheel at a constant speed above its set-point does not look stalled.
 
-    It looks stalled if the other wheel's speed changes meanwhile.
+    Feed-forward gives power at any speed, so the wheel may roll. But if the other wheel's speed
+    changes meanwhile, the constant speed shows that the wheel is stalled.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -153,10 +155,10 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel that the odometry assumes to be at rest looks stalled if it gets no power.
+    """A wheel looks stalled if the odometry assumes that it is at rest, and if it gets no power.
 
-    The reported speed of the wheel is just above its set-point. So the speed controller gives no
-    power, and the wheel cannot start by itself.
+    The board repeats the last speed of a wheel at rest. Here, this speed is just above the
+    set-point. So the speed controller gives no power, and the wheel cannot start by itself.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -194,16 +196,16 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     right_rpm: int,
 ) -> None:
-    """A wheel whose fast reported speed stays the same may be at rest, or may roll steadily.
+    """A wheel for which the board always reports the same high speed may be at rest, or may roll.
 
     The driver provides for both cases:
 
-    * The wheel may be at rest, and the board may use its old speed, so that the motor gets no
-      power. So the driver sends RPM 0/0, which clears this speed.
-    * The wheel may roll: the odometry keeps the distance.
+    * If the wheel is at rest, the board may use the wheel's old speed, and give the motor no power.
+      So the driver sends RPM 0/0, which clears this speed.
+    * If the wheel rolls, the robot has driven. So the odometry keeps the driven distance.
 
-    ``right_rpm``: reported speed of the right wheel, whose set-point is −31 RPM. At −68 RPM, the
-    wheel rolls with full power.
+    ``right_rpm``: reported speed of the right wheel, in RPM. The set-point is −31 RPM. A wheel with
+    this set-point rolls at −30 RPM, or at −68 RPM if the controller gives full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

@@ -79,10 +79,12 @@ def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The driver reports once that a terminal mode has ended, even if the board misses some lines.
+    """The user ends a terminal mode, and the driver reports once that the mode has ended.
 
-    The terminal mode has overwritten the left short correction, a factor in the measurement of the
-    left wheel's speed. The driver restores this factor.
+    The terminal mode has overwritten the setting "left short correction", a factor in the
+    measurement of the left wheel's speed. The driver restores this factor.
+
+    ``hears``: whether the board receives the driver's lines in the first 1.3 s.
     """
     bench = Bench(firmware)
     configure(bench, GPS)

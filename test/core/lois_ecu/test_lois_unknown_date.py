@@ -138,9 +138,10 @@ def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
 
 @WORKS
 def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirks) -> None:
-    """At midnight the date changes, and the driver requests the new date at once.
+    """At midnight the GPS date changes, and the driver requests the new date at once.
 
-    Positions are still fixes.
+    All positions stay valid fixes. At most two GPS times are unknown, and the last time has the new
+    date.
     """
     rig = GpsRig(quirks, utc_s=UTC_S + DAY_S - 10, dated=True)
     rig.run(5.0)

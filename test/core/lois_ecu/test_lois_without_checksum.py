@@ -38,12 +38,13 @@ def test_a_board_that_restarts_in_a_drive_is_told_again_to_expect_no_checksums(
 
 @pytest.mark.slow
 def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -> None:
-    """The left short correction keeps its value when settings are written during a drive.
+    """The driver writes the settings during a drive, and the left short correction keeps its value.
 
     This correction is a factor in the measurement of the left wheel's speed. The driver writes the
     settings five times.
 
-    Bug: the fifth time, the driver ended with the mode line, which sets the correction to almost 0.
+    Bug: the fifth time, the driver wrote the mode line last. This line sets the correction to
+    almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -78,12 +79,12 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
 
 @FIRMWARE
 def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firmware: str) -> None:
-    """A damaged line switches the board's checksums on, after its settings were confirmed.
+    """A board that works without checksums receives a damaged line, and then expects checksums.
 
-    The wheels do not start. At rest, the driver writes the mode in both forms. The next drive moves
-    the robot.
+    The wheels do not start. While the robot is at rest, the driver writes the mode line with and
+    without a checksum. The next drive moves the robot.
 
-    Bug: the driver wrote the mode only without a checksum, and the board ignored all lines.
+    Bug: the driver wrote the mode line only without a checksum, so the board ignored all lines.
     """
     bench = Bench(firmware, LoisEcuSettings(with_sum=False))
     bench.run(5.0)

@@ -73,10 +73,10 @@ def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
 def test_a_board_without_checksums_is_set_right_although_its_ticks_are_lost() -> None:
     """Another program has switched the board's checksums off, and the line loses all tick reports.
 
-    The driver corrects the setting within ten seconds, and sends a Stop that the board obeys.
+    The driver switches the checksums on within ten seconds, and sends a Stop that the board obeys.
 
-    Bug: the driver waited for ticks, so the board never obeyed a Stop again. If two characters of a
-    Stop were lost, its checksum became the duty of a wheel.
+    Bug: the driver waited for ticks, so the checksums stayed off, and the board obeyed no Stop. If
+    a Stop lost two characters, the board used the checksum of the Stop as the duty of a wheel.
     """
     _, robot = MAKERS["lois_ecu"]()
     robot.board.receive(b":11000000043e\n")

@@ -16,7 +16,7 @@ def registers(bench: MartBench) -> tuple[int, int]:
 
 
 def creeping(firmware: Firmware = "source") -> MartBench:
-    """Return a bench whose robot has just driven straight, and whose left motor is still on."""
+    """Return a test bench whose robot has just driven straight. Its left motor is still on."""
     bench = MartBench(firmware).ready()
     bench.go_to(0.5, 0.0, 0.0)
     pilot = bench.board._pilot

@@ -71,7 +71,7 @@ class World(NamedTuple):
 
 
 Rules = Callable[[State, str, Motion], bool]
-"""A function that returns whether a command is allowed, like the driver's table of commands. Its
+"""A function that decides whether a command is allowed, as the driver's table of commands does. Its
 arguments are the state of the driver, the command, and the motion of the robot."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
 """A function that returns all commands that the table of commands allows. Its arguments are the
@@ -209,10 +209,10 @@ def sweeps_first(driver: Driver) -> bool:
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which the driver finds out which motion is in progress.
+    """Return the model's step in which the driver finds out which motion is in progress.
 
-    The driver does this after a stop on the stop port. A lost reply is not modelled, because it
-    would not change the world.
+    The driver does this after it has used the stop port. A lost reply is not modelled, because it
+    would not change the state of server, driver or network.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.

@@ -1,8 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A search through all reachable worlds of ``mart_model`` for one that must not occur.
+"""A search through all worlds that ``mart_model`` can reach, for one that must not occur.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: up to 3 late copies.
+A world is one state of server, driver and network.
+
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: the argument is the
+largest number of late copies.
 
 Results: docs/internals/mart_searches.md.
 """
@@ -22,10 +25,12 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong with the server or the robot, or an empty text if nothing is wrong.
 
-    * If the IMU is dead, or if the driver has given up: only a crash of the server is wrong.
-    * While the driver finds out which motion is in progress: a crash, or a command port that hangs.
-    * At all other times: a crash, a command port that hangs, a next stop that will hang, refused
-      motions of which the driver does not know, or a robot that nothing stops.
+    * In every state, a crash of the server is wrong.
+    * If the IMU works, and the driver has not given the server up (as lost, or after more than
+      ``UNANSWERED`` stops without an answer), a command port that hangs is wrong, too.
+    * If, in addition, the driver is not finding out which motion is in progress, three more cases
+      are wrong: the next stop will hang, the server refuses motions and the driver does not know
+      this, or nothing stops the robot.
     """
     server, driver = world.server, world.driver
     if server.crashed:

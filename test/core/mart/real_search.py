@@ -40,14 +40,15 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""Largest number of datagrams that the search disturbs for each wish, in each direction.
+"""Largest number of datagrams that the search disturbs per user command, in each direction.
 
 Each is disturbed in a trial of its own. Regular queries and their replies are not counted.
 """
 PROOF_S: Final = 0.25
-"""Longest allowed time in s from the failure of the IMU to the start of a motion.
+"""Longest time in s after the failure of the IMU in which the driver may still start a motion.
 
-If the IMU failed earlier, the driver's check before the start must find it.
+Later, a start is a failure of the driver: its check of the IMU before the start must find the
+failure.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
@@ -168,23 +169,29 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield trials of all sequences of two wishes, each trial with a fault of one datagram."""
+    """Yield trials of all pairs of user commands in ``WISHES``, with one fault in each trial."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 
 
 def eights() -> Iterator[Trial]:
-    """Yield trials of sequences of eight wishes, each trial with a fault of one datagram."""
+    """Yield trials of some sequences of eight user commands, with one fault in each trial.
+
+    The commands are in ``WISHES``.
+    """
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield trials in which a user commands ``wishes``, and one datagram is disturbed.
+    """Yield the trials of one sequence of user commands, with one disturbed datagram in each trial.
 
-    The first datagrams of each direction are disturbed, at most ``MOST_DATAGRAMS`` for each wish.
-    Each of these datagrams has one trial for each fate.
+    ``wishes``: the names of the commands, in order.
+
+    In each direction, only the first datagrams are disturbed, at most ``MOST_DATAGRAMS`` for each
+    command. Each of these datagrams is disturbed in four trials: once in each way that ``FATES``
+    lists.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
@@ -272,10 +279,11 @@ def search(trials: list[Trial]) -> list[tuple[Trial, str]]:
 
 
 def main() -> None:
-    """Run all sets of trials, or only those that the command line names.
+    """Run all sets of trials, or only the sets that the command line names.
 
-    The names are ``pairs`` (sequences of two wishes), ``eights`` (sequences of eight wishes) and
-    ``beginnings`` (starts of a driver).
+    * ``pairs``: sequences of two user commands.
+    * ``eights``: sequences of eight user commands.
+    * ``beginnings``: a driver starts while the server may be executing a command.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("sets", nargs="*", choices=tuple(SETS), help="default: all sets")

@@ -49,7 +49,7 @@ def test_a_reply_is_read(data: bytes) -> None:
 
 @given(st.binary(max_size=600))
 def test_no_datagram_raises(data: bytes) -> None:
-    """The decoder makes one message of each datagram, whatever its bytes.
+    """The decoder makes one message of each datagram that has bytes, whatever these bytes are.
 
     An empty datagram gives no message.
     """
@@ -213,10 +213,10 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """Only a reply that cannot be the copy of an earlier reply proves a stop.
+    """The driver sends two stops, and only a reply that cannot be a copy proves a stop.
 
-    The first stop may overtake the start, so its reply proves nothing. A copy of this reply can
-    arrive until 0.6 s after the first stop.
+    The first stop may overtake the start, so the reply to it proves nothing. A copy of this reply
+    can arrive until 0.6 s after the first stop. So only a reply that arrives later proves the stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -298,9 +298,10 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """A number that contradicts the encoder is not used as the angle of a turn.
+    """The driver expects the angle of a turn, and receives the number of a late encoder count.
 
-    The number is a late encoder count.
+    This number contradicts the present encoder count, so the odometry computes the turn from the
+    encoder count alone.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

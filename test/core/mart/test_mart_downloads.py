@@ -250,10 +250,10 @@ def with_a_copy_of_the_last_ok(bench: MartBench, job: Job) -> JobDone:
 
 
 def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
-    """A gyro calibration ends with ``ok``, and the log is requested at once.
+    """A gyro calibration ends with ``ok``, and the user requests the server's log at once.
 
-    A copy of the ``ok`` arrives before the server's reply to EXIT. The log is downloaded
-    nevertheless.
+    The driver sends EXIT, which downloads the log. A copy of the ``ok`` arrives before the server's
+    reply to EXIT. The driver ignores the copy, and downloads the log.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -264,9 +264,10 @@ def test_a_copy_of_an_earlier_ok_is_not_taken_for_the_log() -> None:
 
 
 def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
-    """A copy of an earlier ``ok`` is not taken for the reply to LOG, which starts the log.
+    """The command LOG, which starts a log, is lost, and a copy of an earlier ``ok`` arrives.
 
-    LOG is lost, so the driver later refuses a download, which would end the server.
+    The driver does not take the copy for the reply to LOG, and knows that no log was started. So it
+    later refuses to download a log. Such a download would end the server.
     """
     bench = MartBench().ready()
     assert bench.job(Job.BIAS).success
@@ -280,10 +281,10 @@ def test_a_copy_of_an_earlier_ok_does_not_start_a_log() -> None:
 
 
 def test_a_server_that_ends_without_a_file_has_not_sent_its_log() -> None:
-    """The server keeps no log any more, so it answers the download of the log with a bare ``ok``.
+    """The driver sends EXIT to download a log, and the server has no log any more.
 
-    EXIT downloads the log, and ends the server. The download fails, and its result says that the
-    server has ended.
+    EXIT ends the server in any case. The server answers only ``ok``, without a file. The download
+    fails, and its result says that the server has ended.
     """
     bench = MartBench("documented").ready()
     assert bench.job(Job.LOG).success

@@ -123,9 +123,9 @@ def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: b
 
 
 def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
-    """After a lost start and a silence of 0.5 s, the driver waits 1.5 s before it starts again.
+    """The command that starts a drive (RM) is lost, and the server is silent for 0.5 s.
 
-    The server may have restarted.
+    The server may have restarted, so the driver waits for 1.5 s before it sends RM again.
     """
     bench = on(NetworkFaults(), "firmware")
     network, away_s = bench.robot.network[0], math.inf
@@ -144,9 +144,10 @@ def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
 
 
 def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
-    """An incomplete download is not taken for a restart, and the next drive begins at once.
+    """A download from the server loses one piece, and the driver waits for this piece for 1 s.
 
-    The driver waits for the lost piece for 1 s.
+    The download then fails. The driver does not take the silence for a restart of the server, and
+    begins the next drive at once.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 2.0)

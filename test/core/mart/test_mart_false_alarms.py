@@ -42,9 +42,9 @@ def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
 def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
     firmware: Firmware,
 ) -> None:
-    """The network loses 3 % of the datagrams of some drives.
+    """The network loses 3 % of the datagrams while the robot drives and stops several times.
 
-    The driver does not report that the robot stands still, or that the IMU is dead.
+    The driver reports neither that the robot does not move nor that the IMU is dead.
     """
     for seed in range(2):
         bench = MartBench(firmware, NetworkFaults(lose=0.03), seed=seed, motor_lag_s=0.1).ready()

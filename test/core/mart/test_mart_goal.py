@@ -112,10 +112,10 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 
 
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
-    """A straight move that is stopped after 80 s (about 20 m) does not use up the moves to a goal.
+    """The driver stops a straight move after 80 s (about 20 m), and counts moves from zero again.
 
-    After such a move, the driver counts the moves from zero again. So it can reach a far goal
-    within the largest number of moves.
+    The driver gives up a goal after a certain number of moves. With the new count, the robot can
+    reach a goal that is far away.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

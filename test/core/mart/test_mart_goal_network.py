@@ -39,20 +39,23 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed: int) -> None:
-    """A goal is reached or discarded although a quarter of all datagrams is lost.
+    """The network loses a quarter of all datagrams. The robot's goal is reached or discarded.
 
-    A move waits until no HELLO is on its way, but only for a limited time.
+    Before a move, the driver waits until no HELLO (name query) is on its way. On such a network,
+    this wait might never end, so it has a limit.
     """
     bench = on(NetworkFaults(lose=0.25, delay_s=0.01), EVERY_FIRMWARE[seed % 3], seed)
     reach(bench, Pose(0.6, 0.3, 1.5))
 
 
 def test_a_goal_that_another_cause_ends_is_noticed() -> None:
-    """The e-stop ends a goal: the driver does not report "over", and gives no notice of the goal.
+    """The e-stop ends a goal, and the tests' function ``reach`` notices the end within 30 s.
 
-    The tests' function ``reach`` waits for the end of a goal. It returns as soon as the session has
-    dropped the goal. Regression: the driver ended a goal because of a push, and this aborted a
-    measurement of many goals.
+    ``reach`` waits for the end of a goal. The driver does not report "over" after an e-stop, so
+    ``reach`` also asks whether the session has dropped the goal.
+
+    Regression: the driver ended a goal because the robot was pushed. ``reach`` did not notice this,
+    and a measurement of many goals was aborted.
     """
     bench = MartBench("source").ready()
 
@@ -198,10 +201,11 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 
 
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
-    """The first move of a robot goes only half as far as requested, and the goal is kept.
+    """The first move of a robot goes only half as far as requested, and the driver keeps the goal.
 
-    A move that ran twice, and was stopped the second time, would look alike. But the driver has not
-    learned yet how far this robot drives, so it does not conclude this.
+    The encoder would show the same after a duplicated move if the driver had stopped the second run
+    halfway. The driver does not assume this, because it has not learned yet how far this robot
+    drives.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -223,10 +227,11 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
-    """The reply to a turn is lost. The driver still knows that the encoder count began at zero.
+    """The reply to a controlled turn is lost, so the driver sends a stop.
 
-    It does not subtract the last count before the turn. "No motion" in reply to a stop shows that
-    the turn is complete.
+    The server answers "no motion", which shows that the turn is complete. The encoder count began
+    at zero with the turn. So the driver uses the complete count for the turn, and does not subtract
+    the last count before the turn.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -243,9 +248,10 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 
 
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
-    """A turn that was counted by the encoder is not added again by the next heading.
+    """The robot turns, and then drives straight. The driver reads the heading only after the drive.
 
-    The driver reads this heading only after the straight move that follows.
+    The odometry has already added the turn by the encoder count. The heading that is read contains
+    the same turn, and the odometry does not add it again.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))
@@ -323,10 +329,10 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 
 
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
-    """A late answer to HELLO does not hide a running copy of a move: the copy is stopped.
+    """The network duplicates a move, and an old answer to HELLO (query of the name) arrives late.
 
-    While a move runs, the server does not answer HELLO (query of its name). But a late answer may
-    arrive in this time.
+    While a move runs, the server does not answer HELLO. So the late answer seems to show that the
+    server runs no move. The driver stops the second run of the move nevertheless.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]

@@ -62,9 +62,10 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 
 
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
-    """An encoder count that follows the stop of a turn is not used as the angle of the turn.
+    """The stop of a turn overtakes an encoder query. The server answers the query after the stop.
 
-    The stop has overtaken the encoder query. The motors' speed is not learned from the count.
+    The driver does not use this encoder count as the angle of the turn, and does not learn the
+    motors' speed from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -104,9 +105,11 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """A copy of a refusal is not taken for the reply to the next check of the IMU.
+    """The network duplicates the server's replies "not supported". The driver ignores the copies.
 
-    A server as in the manual refuses SSP (speed of turns) and RST IMU (the check).
+    A server that follows the manual gives this reply to SSP (speed of turns) and to RST IMU (check
+    of the IMU). The driver does not take a copy for the reply to its next check of the IMU, and the
+    robot turns.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -257,9 +260,9 @@ def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
     """Change the network so that it loses some commands and duplicates the next RST IMU.
 
-    * ``lost``: beginnings of the lost commands.
+    * ``lost``: the network loses each command that starts with one of these texts.
 
-    The copy, and the reply to the copy, are each late by 0.29 s.
+    The copy of RST IMU is late by 0.29 s, and so is the server's reply to this copy.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []

@@ -43,9 +43,10 @@ def outlived(
 def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     motion: tuple[float, float], firmware: Firmware, boot_s: float, gap_s: float
 ) -> None:
-    """A server with a hung stop port gets no motion until a restart, even if the IMU works again.
+    """The IMU dies in a motion, the stop port hangs, and later the IMU works again.
 
-    A changed heading does not show a restart: a restart would set the heading to zero.
+    The driver sends no motion until the server is restarted. A gap in the network and a changed
+    heading do not show a restart: a restart would set the heading to zero.
     """
     bench = outlived(firmware, motion)
     bench.speaks = False
@@ -69,9 +70,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
     delay_s: float, seed: int
 ) -> None:
-    """The driver recognises a lost server, and refuses motion, although replies are reordered.
+    """The IMU dies in a motion, the stop port hangs, and later the IMU works again.
 
-    When the IMU works again, the server answers all waiting requests at once.
+    The server then answers all waiting requests at once, and the network reorders the replies. The
+    driver recognises that the server is lost, and refuses motion.
     """
     bench = outlived("source", (0.3, 0.1), delay_s, seed)
     way_m = bench.server.chassis.way_m
@@ -87,11 +89,11 @@ def test_a_lost_server_is_recognised_although_the_network_reorders_its_replies(
 def test_a_driver_that_finds_a_hung_server_does_not_drive_it(
     met: bytes, wait_s: float, delay_s: float
 ) -> None:
-    """The driver's first stop makes the server hang, because the IMU is dead. Motion is refused.
+    """The driver starts while the robot drives forward (RM) or backward (B) with a dead IMU.
 
-    The driver starts during a forward (RM) or backward drive (B). The stop port hangs, too.
-
-    ``wait_s``: time in s from the driver's start until the IMU works again.
+    The driver's first stop makes the server hang, and then the stop port hangs, too. The IMU works
+    again ``wait_s`` seconds after the driver's start, and the server answers. The driver refuses
+    motion.
     """
     bench = MartBench("source", NetworkFaults(delay_s=delay_s))
     bench.server.receive(met, 0, None, 0.0)
@@ -128,10 +130,10 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 
 @pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
-    """The server's process stands still for 5 s while the robot is at rest. Then it works again.
+    """The server's process stands still for 5 s while the robot is at rest, and then works again.
 
-    The driver accepts commands again, although the server now answers old queries. Late replies to
-    stops would be different: they would show that the stop port may hang.
+    The server answers old queries late. The driver accepts commands again, because only late
+    replies to stops would show that the stop port may hang.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)
@@ -149,9 +151,10 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
 
 
 def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
-    """Return a bench whose driver starts while RM turns the robot about its right wheel.
+    """Return a test bench whose driver starts while RM turns the robot about its right wheel.
 
-    The network fails for the first ``away_s`` seconds, so the driver has used the stop port.
+    The network fails for ``away_s`` seconds from the driver's start. In this time, no stop of the
+    driver is answered, so the driver has used the stop port.
     """
     bench = MartBench(firmware)
     bench.server.receive(b"RM 30", 0, None, 0.0)
@@ -170,9 +173,10 @@ def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
 def test_a_robot_whose_right_wheel_stands_is_stopped_if_the_left_wheel_may_turn(
     away_s: float, firmware: Firmware
 ) -> None:
-    """A robot turns about its resting right wheel. The driver stops it by the commands SL and SS.
+    """A robot turns about its resting right wheel, the only wheel with an encoder.
 
-    Only the right wheel has an encoder, but the server reports a motion in progress.
+    The server reports a motion in progress, so the left wheel may turn. The driver stops the robot
+    by the commands SL and SS.
     """
     bench = met_in_a_pivot(firmware, away_s)
     assert abs(bench.robot.board.facts["yaw_rate_radps"]) > 0.5

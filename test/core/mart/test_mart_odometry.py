@@ -31,10 +31,11 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 
 
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
-    """Return a bench after two motions that end with equal encoder counts.
+    """Return a test bench after two motions that end with equal encoder counts.
 
-    No reply arrives from the start of each motion until ``quiet_s`` after the beginning of its
-    stop. The covariance is checked after each motion.
+    In each motion, the network loses all replies from the start of the motion until ``quiet_s``
+    seconds after the driver begins to stop the robot. After each motion, this function checks the
+    covariance.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -113,7 +114,10 @@ def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_t
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """A copy of an ok does not show a turn whose start was lost: the encoder count is unchanged."""
+    """The command that starts a turn is lost, and a copy of an older reply ``ok`` arrives.
+
+    The encoder count does not change, so the driver does not add a turn to the odometry.
+    """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(2.0)
@@ -188,9 +192,9 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
-    """A motion that an ok seems to confirm is not added if the encoder count does not change.
+    """A copy of an older reply ``ok`` seems to confirm a motion, but the encoder count stays.
 
-    The ok was a copy of an older reply.
+    The odometry adds no motion.
     """
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
@@ -287,10 +291,11 @@ def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
 def test_the_covariance_includes_a_change_that_is_carried_out_twice(
     command: tuple[float, float],
 ) -> None:
-    """A command that changes the motors' speeds is carried out twice, so the robot turns too far.
+    """The robot drives backward, and the server carries out a change of the motors' speeds twice.
 
-    The covariance covers this turn. The robot drives backward, so nothing measures the turn. Only
-    the server's second reply shows that the command has arrived twice.
+    The robot turns too far. Nothing measures this turn in a backward drive. The driver learns only
+    from the server's second reply that the command has arrived twice. The covariance covers the
+    turn.
     """
     bench = MartBench("source").ready()
     inner, first = bench.robot.receive, []

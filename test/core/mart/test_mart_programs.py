@@ -15,7 +15,7 @@ PROGRAMS = ["honesty", "mart_campaign", "mart_goals", "mart_model_search", "real
 @pytest.mark.parametrize("name", PROGRAMS)
 @pytest.mark.parametrize(("argument", "code"), [("--help", 0), ("nonsense", 2)])
 def test_help_and_a_wrong_argument_show_the_usage(name: str, argument: str, code: int) -> None:
-    """A user asks for help, or gives an argument that is neither a number nor a name of a set.
+    """A user starts one of the tests' programs with ``--help`` or with a wrong argument.
 
     The program shows its usage, without a traceback.
     """

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that a MART controller's recording is refused as a port, and that no text offers it."""
+"""Tests that the driver accepts no recording (``replay://``) as the port of a MART controller.
+
+They also check that no description of a parameter names ``replay://``.
+"""
 
 import pytest
 

@@ -107,8 +107,9 @@ def test_the_covariance_includes_the_unknown_turn_if_the_command_ends_in_a_resta
 ) -> None:
     """The server restarts in a curve, and the command ends before the server answers again.
 
-    On some servers, the heading changes further after its restart at zero, so it is not exactly
-    zero. The driver does not take this heading for a turn.
+    The covariance covers the error of the heading. A restart sets the server's heading to zero. On
+    some servers, the heading then changes by a little. The driver does not take this change for a
+    turn.
     """
     bench = MartBench(firmware).ready()
     bench.command(0.2, 0.3, drive_s)
@@ -123,9 +124,10 @@ def test_the_covariance_includes_the_unknown_turn_if_the_command_ends_in_a_resta
 def test_a_restart_before_the_last_heading_of_a_curve_is_not_taken_for_a_turn(
     boot_s: float, firmware: Firmware
 ) -> None:
-    """The server restarts just after it has stopped a curve, before the driver asks for a heading.
+    """The server stops a curve, and restarts before the driver has asked for the last heading.
 
-    The next heading is near zero. The robot has not turned back.
+    The next heading is near zero, because the server has restarted. The driver does not assume that
+    the robot has turned back, and the covariance covers the error of the heading.
     """
     bench = MartBench(firmware).ready()
     bench.command(0.2, 0.3, 3.0)

@@ -111,10 +111,10 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
 def test_motors_that_run_on_after_a_controlled_move_are_switched_off_before_the_server_is_ready(
     boot_s: float, goal: tuple[float, float, float]
 ) -> None:
-    """The server restarts in a controlled move. The motors keep running.
+    """The server restarts in a controlled move, and the motors keep running.
 
-    MCS and MSM need only the motor board. So the driver does not wait until the server has started
-    up.
+    The driver switches the motors off by MCS and MSM while the server is still starting up. These
+    commands need only the motor board.
     """
     bench = MartBench("source").ready()
     bench.go_to(*goal)
@@ -132,11 +132,11 @@ def test_motors_that_run_on_after_a_controlled_move_are_switched_off_before_the_
 
 @pytest.mark.parametrize("offset_s", [0.01 * step for step in range(0, 200, 8)])
 def test_a_quick_restart_in_a_turn_on_the_spot_does_not_crash_the_server(offset_s: float) -> None:
-    """The server restarts within 50 ms in a turn, so that no reply is missing.
+    """The server restarts within 50 ms in a turn on the spot, and the driver does not notice this.
 
-    So the driver does not notice the restart. VOLTS (voltage query) would crash the server, and the
-    motors would stay on. The driver sends no VOLTS in turns on the spot, because it does not need
-    the voltage there.
+    VOLTS (voltage query) would crash a server that is starting up, and the motors would stay on.
+    The driver sends no VOLTS in turns on the spot, because it does not need the voltage there. So
+    the server does not crash.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 2.0)
@@ -155,8 +155,9 @@ def test_a_restart_just_after_a_long_turn_on_the_spot_does_not_crash_the_server(
 ) -> None:
     """After a turn of 12 s, the server restarts at rest, before the driver asks for the voltage.
 
-    The query of the voltage (VOLTS) crashes a server that is starting up. A reply is missing, so
-    the driver waits before it sends VOLTS, although the last VOLTS was long ago.
+    The voltage query (VOLTS) is overdue, because the driver sends no VOLTS in a turn. VOLTS would
+    crash a server that is starting up. But the server has left a request unanswered, so the driver
+    waits before it sends VOLTS.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.5, 12.0)
@@ -184,9 +185,10 @@ def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Firmware) -> None:
-    """If the IMU is dead after a restart in a move, MCS switches the motors off, without a turn.
+    """The server restarts in a move, the motors run on, and the IMU is dead.
 
-    MCS needs no IMU.
+    The driver switches the motors off by MCS, which needs no IMU. The driver does not use a turn of
+    1 degree (MCR), which would also end with the motors off.
     """
     bench = rescued(firmware, alive=False)
     assert bench.robot.stands
@@ -223,10 +225,10 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_queries(
     after_s: float, boot_s: float
 ) -> None:
-    """The server restarts while its first turn is stopped, after its reply to a first stop (SM).
+    """The driver stops the first turn of a server. The server answers a stop (SM), and restarts.
 
-    A voltage query (VOLTS) would crash the server that starts up. The driver delays this query,
-    because the stop took three commands.
+    The driver needs three stop commands, so it assumes that the server may have restarted. It
+    delays the voltage query (VOLTS), which would crash a server that is starting up.
     """
     bench = MartBench("source").ready()
     bench.command_until(0.0, 0.5, lambda: not bench.robot.stands, 8.0)
@@ -243,9 +245,10 @@ def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_
 def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
     offset_s: float,
 ) -> None:
-    """The driver does not crash a controller that is started in place of another server.
+    """Another server answers at the controller's address, until the controller is started there.
 
-    The address is never silent, so no silence shows the change.
+    The address is never silent, so the driver cannot recognise the start by a silence. The driver
+    still gives the controller time to start up: an early command could crash the controller.
     """
     bench = MartBench("source").ready()
     seconds = 8.0 + offset_s
@@ -305,10 +308,11 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """A server without MCS (direct control) is restarted in a drive, and the motors still run.
+    """A server without MCS (direct control) is restarted in a drive, and the motors run on.
 
-    A turn of 1 degree stops the robot. The network is bad, so the encoder counts that show the
-    motion may come long after the stops.
+    The driver sends a turn of 1 degree, which ends with the motors off. The network is bad, so the
+    encoder counts that show the motion may come long after the driver's first stops. The robot is
+    at rest within 8.5 s.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()
@@ -330,9 +334,10 @@ def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: 
 def test_the_estop_stops_the_robot_at_once_although_the_server_was_just_restarted(
     firmware: Firmware, motion: tuple[float, float]
 ) -> None:
-    """After an e-stop, MCS switches the motors off at once, although the server has just restarted.
+    """The server restarts in a drive, the motors run on, and the user sets the e-stop.
 
-    The server answers the usual stop with "no motion".
+    The restarted server answers the usual stop with "no motion", so the driver switches the motors
+    off by MCS at once.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

@@ -42,11 +42,11 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """The search finds no failure: the server does not hang, and the robot can be stopped.
+    """The search finds no case in which the server crashes or hangs, or nothing stops the robot.
 
-    It tries all cases in which up to two copies and one reply are late, and the IMU may die at any
-    step. With a dead IMU, or after the driver has given up, only a crash of the server is a
-    failure.
+    The search tries all cases in which up to two copies and one reply are late, and the IMU may die
+    at any step. If the IMU is dead, or the driver has given the server up, the search allows
+    everything except a crash of the server.
     """
     found = search()
     assert found.bad == ()
@@ -143,10 +143,10 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return the part of the server's state in which model and firmware must agree.
+    """Return the state of the server, with fixed values for what the test cannot compare.
 
-    While the command port is silent, the motion, the reason for the silence (``port``) and
-    ``released`` cannot be observed. They are then set to fixed values.
+    If the command port waits for the IMU or hangs, the test can see neither which of the two is
+    true, nor the motion, nor whether the stop port has stopped a motion (``released``).
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

@@ -38,10 +38,10 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float
 ) -> None:
-    """A measured speed above the learnt speed at 14 units does not decrease the learnt speed.
+    """The driver measures a motor's speed too low at 26 units, and then correctly at 14 units.
 
-    The measured speed is the true one. An earlier measurement at 26 units was too low, and has
-    lowered the learnt line.
+    The first measurement has lowered the speed that the driver expects at 14 units. The second
+    measurement, above the expected speed, does not lower the expected speed further.
     """
     line = MotorLine()
     for _ in range(8):
@@ -79,9 +79,9 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
 def test_whatever_is_measured_the_units_rise_with_the_speed(
     measured: list[tuple[float, float]],
 ) -> None:
-    """Whatever the driver measures, more speed needs more units.
+    """Whatever speeds the driver has measured, the motor needs more units for a higher speed.
 
-    The units stay between 0 and 200.
+    The computed units are between 0 and 200, before the driver limits them to 127.
     """
     line = MotorLine()
     for units, speed in measured:
@@ -95,7 +95,10 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """Noise in a long drive at one speed changes the units for another speed by at most 3."""
+    """The driver measures one noisy speed of a motor again and again in a long straight drive.
+
+    The computed units for another, lower speed change by at most 3.
+    """
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
         line.learn(units, slope * max(0.0, units - dead))
@@ -178,9 +181,10 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """On a slow network, a change of speed is at most 15 units forward, and 5 units backward.
+    """On a slow network, the driver changes motor units by at most 15 forward, and 5 backward.
 
-    In a backward drive, the heading may not show that the network has duplicated a change.
+    The network may deliver a change twice, so each change must be small. The limit is lower in a
+    backward drive, where the driver may fail to notice the second change.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05
