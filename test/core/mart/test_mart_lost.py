@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 def outlived(
     firmware: Firmware, motion: tuple[float, float], delay_s: float = 0.0, seed: int = 0
 ) -> MartBench:
-    """Return a bench with a server whose stop port has hung since the IMU died in a motion.
+    """Return a test bench with a server whose stop port has hung since the IMU died in a motion.
 
     Now the IMU works again.
     """

@@ -169,7 +169,7 @@ def test_a_restart_just_after_a_long_turn_on_the_spot_does_not_crash_the_server(
 
 
 def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
-    """Return a bench whose server was restarted during a move, 8 s ago.
+    """Return a test bench whose server was restarted during a move, 8 s ago.
 
     ``alive``: whether the IMU works after the restart.
     """
