@@ -215,12 +215,14 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 
 @pytest.mark.parametrize("number", range(3))
 def test_a_lost_reply_does_not_make_a_stop_look_like_a_restart(number: int) -> None:
-    """The network loses a reply to a query. Then a drive is stopped as soon as the wheels turn.
+    """A lost reply to a query does not make the driver suspect a restart of the server.
 
-    The server answers the start with ``ok``, and the stop with ``ok``. The driver repeats the stop,
-    and the server answers with "no motion". The driver knows that the stop is answered, because it
-    has received two ``ok`` replies, and the network duplicates none. So "no motion" is not a sign
-    of a restart, and the driver does not switch the motors off by MCS.
+    The network loses one to three replies to queries. Later, the user starts a drive, and stops it
+    as soon as the wheels turn. The server answers the start and the stop with ``ok``. The driver
+    repeats the stop, and the server answers "no motion".
+
+    The network duplicates no reply, so the two ``ok`` replies answer the start and the stop. "No
+    motion" is then not a sign of a restart, and the driver does not switch the motors off by MCS.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 1.0)
@@ -282,9 +284,10 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """The driver uses the stop port only when the network delay since the last usual stop is over.
+    """After the last usual stop (SM or SRM), the driver waits for 0.3 s, then uses the stop port.
 
-    The server could hang if the stop port were used directly after a usual stop (SM or SRM).
+    The longest delay of a datagram is 0.3 s. The server could hang if the driver used the stop port
+    directly after a usual stop.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
@@ -345,9 +348,10 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
 
 
 def test_the_replies_to_a_repeated_estop_count_as_unmatched_not_as_late() -> None:
-    """The network is good, and the e-stop is latched, so the driver repeats its stops.
+    """The e-stop is latched, so the driver repeats its stops over a good network.
 
-    Their replies are unmatched. No other value rises, because no reply is late or duplicate.
+    In the figures of the board, only the number of unmatched replies changes, because the replies
+    to the repeated stops match no pending request.
     """
     bench = MartBench().ready()
     before = bench.board.figures.own

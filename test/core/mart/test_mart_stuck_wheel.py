@@ -43,9 +43,10 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
 
 @pytest.mark.parametrize("first_s", [0.0, 2.0])
 def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
-    """A left wheel that is stuck in a turn is reported, and the covariance covers the error.
+    """The driver reports a left wheel that is stuck in a turn. The covariance covers the error.
 
-    The encoder shows a wrong angle, because the right wheel turns twice as far as usual.
+    Only the right wheel has an encoder. For the same turn of the robot, the right wheel turns twice
+    as far as usual, so the angle by the encoder is wrong.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)

@@ -67,9 +67,11 @@ def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
 
 
 def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
-    """If the server refuses a repeated MCS (direct control of the motors), the driver sends MSM.
+    """The driver sends MCS (direct control of the motors) to switch them off. The reply is lost.
 
-    The refusal shows that the first MCS has arrived. MSM ends the direct control.
+    The driver repeats MCS, and the server refuses the repeated MCS, because the direct control has
+    already begun. So the driver knows that the first MCS has arrived. The driver then sends MSM,
+    which ends the direct control.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -268,9 +270,9 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 
 
 def test_a_server_without_these_commands_is_asked_once() -> None:
-    """If a server does not know MCS (switch off the motors), the driver sends MCS only once.
+    """The robot makes two straight moves, and the server does not know MCS (switch off the motors).
 
-    The robot makes two straight moves.
+    The driver sends MCS only once.
     """
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):

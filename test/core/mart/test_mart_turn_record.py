@@ -59,12 +59,12 @@ def lose_once(bench: MartBench, begins: bytes) -> None:
 
 
 def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
-    """Let the network duplicate the next ``request``.
+    """Let the network duplicate the next ``request``, and delay the reply to the duplicate.
 
-    Return a list to which the arrival time of the copy is added.
+    Return a list to which the arrival time of the duplicate is added.
 
-    ``after_s``: delay of the copy, in s. ``late_s``: further delay of the files sent in reply to
-    the copy, in s.
+    ``after_s``: time in s from the request to its duplicate. ``late_s``: additional delay in s of
+    the file that the server sends in reply to the duplicate.
     """
     copied_s: list[float] = []
     there, back = bench.robot.network[0].to_board, bench.robot.network[0].from_board
@@ -98,9 +98,9 @@ def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
 
 
 def test_the_file_of_another_angle_is_not_used() -> None:
-    """The server's record of a turn contains the angle of the request.
+    """The driver does not use the record of a turn for which another angle was requested.
 
-    The driver uses the record only if it has requested the same angle.
+    The record contains the requested angle: 90°. The driver has requested 89°.
     """
     assert recorded_deg([RECORD], MCL.request("SLOW", 89)) is None
 
@@ -219,10 +219,10 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The user downloads the record of a turn, and gets the right file.
+    """The driver downloads the record of a turn, and the network duplicates the driver's request.
 
-    Before, the driver has requested the record for itself, and the network has duplicated this
-    request. So the driver waits until no late reply to the duplicate can arrive any more.
+    Then the user downloads the record of the last straight move. The driver first waits until no
+    late reply to the duplicate can arrive, so the user gets the right file.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))

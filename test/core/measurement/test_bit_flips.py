@@ -59,9 +59,10 @@ class Drive:
         return Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau))
 
     def run(self, seconds: float) -> None:
-        """Drive curves for ``seconds``. Record the last and the worst error of odom.
+        """Drive curves for ``seconds``. Record the errors of odom after a bit has been changed.
 
-        Errors are recorded only after ``arm`` has changed a bit.
+        The method ``arm`` changes one bit of a frame. ``last`` is the newest error. ``worst_m`` and
+        ``worst_rad`` are the largest errors.
         """
         for _ in range(round(seconds / TICK_S)):
             t, before = self.bench.now, len(self.bench.events)

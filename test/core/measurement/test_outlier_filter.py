@@ -130,9 +130,9 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A reading of a knock that saturates the sensor at 2 g is released.
+    """A knock drives the sensor to its limit, 2 g. The filter releases this reading at once.
 
-    No single changed bit turns a reading at rest into this value.
+    A single changed bit cannot turn a reading at rest into 2 g, so the reading is not damaged.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -181,7 +181,9 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement faster than 2 m/s or 8 rad/s is rejected, and counts as lost.
 
-    The next displacement reports this loss, and all losses that the rejected displacement reported.
+    The rejected displacement has reported two earlier losses, and the next displacement has
+    reported one. With the rejected displacement itself, the next displacement then reports four
+    losses.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -212,9 +214,10 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """The speed jumps and stays high. The jump may be real, so the filter releases all readings.
+    """The filter holds the first displacement after a jump in speed until the next one arrives.
 
-    It holds the first displacement after the jump until the next displacement arrives.
+    A pose that comes between the two displacements also waits. The second displacement shows that
+    the speed stays high, so the jump may be real, and the filter releases all three readings.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
@@ -224,9 +227,11 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 @pytest.mark.parametrize("longer", [1.05, 1.5, 2.0, 3.0])
 def test_a_steady_motion_over_a_longer_time_is_delivered_at_once(longer: float) -> None:
-    """One displacement of a steady drive lasts longer, e.g. because a pose was lost before it.
+    """In a steady drive, a displacement is released at once even if it lasts three times as long.
 
-    Regression: with twice the duration, it was rejected as a spike, and ``odom`` lost 4 cm.
+    The displacement lasts longer than the others, for example because a pose was lost before it.
+    Regression: the filter took a displacement with twice the usual duration for a spike, and
+    ``odom`` lost 4 cm.
     """
     steady = DisplacementReading(0.02, 0.0, 0.04, "body", 0.02, 0)
     both = longer * steady.dx_m, longer * steady.dyaw_rad
@@ -367,9 +372,11 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 
 
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
-    """With ``corrected=True``, a step that no robot can drive is released as a correction.
+    """A board corrects its own odometry by a step that no robot can drive.
 
-    It has ``measured=False`` and ``possible=False``. A step with NaN or infinity is rejected.
+    A filter for such a board (``corrected=True``) releases the step with ``measured=False`` and
+    ``possible=False``, because the step is a correction and not a motion. The filter rejects a step
+    with NaN or infinity.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

@@ -48,9 +48,11 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """Four displacements that are rejected after the motion monitor is on again stop the robot.
+    """The driver stops the robot if displacements are rejected while the motion monitor is on.
 
-    Displacements that were rejected while the monitor was off do not count.
+    The motion monitor is switched off and on again. After four more displacements have been
+    rejected, the driver stops the robot. Displacements that are rejected while the motion monitor
+    is off do not count.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)

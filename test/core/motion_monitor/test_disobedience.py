@@ -97,9 +97,10 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """A robot that reverses within a displacement of 0.1 s is not mistaken for a held robot.
+    """A robot is commanded to drive forward, and begins to move backward within a displacement.
 
-    The monitor stops the robot within 0.3 s, although this displacement is near zero.
+    The displacement lasts 0.1 s and can be near zero, but the monitor does not take the robot for a
+    held robot: the driver sends Stop within 0.3 s.
     """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
@@ -116,9 +117,10 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """A robot whose board takes a velocity for a goal is stopped within 0.3 s and 5 cm.
+    """A board takes each velocity for a goal. The driver stops the robot within 0.3 s and 5 cm.
 
-    The board's switch is on position control, and the goal lies behind the robot.
+    The board's switch is on position control. Each of these goals lies behind the robot, so the
+    robot moves in the wrong direction.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m

@@ -130,7 +130,10 @@ def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: 
 
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_a_robot_that_stays_at_rest_is_only_found_to_be_blocked(commanded: Triple) -> None:
-    """A robot does not move at all. The only fault is "blocked", and only in a fast drive."""
+    """A robot stays at rest. The only fault is "blocked", and only if a fast drive is commanded.
+
+    If a slow drive or a slow turn is commanded, the monitor finds no fault.
+    """
     drive = Drive()
     drive.command(*commanded)
     blocked = {Fault.BLOCKED} if commanded[0] > 0.05 else set()
@@ -206,10 +209,10 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """While a commanded robot does not move, the monitor returns a fault each second.
+    """While a commanded robot does not move, the monitor returns the fault ``BLOCKED`` each second.
 
-    The caller must filter out the repetitions. After a release of the e-stop, the fault is
-    ``HELD_BY_ESTOP``.
+    The caller must filter out the repetitions. If the driver's e-stop was released before, the
+    fault is ``HELD_BY_ESTOP``, because the board's own e-stop may still hold the robot.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -259,7 +262,8 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
     """While a driven robot does not obey Stop, the monitor reports a fault every 5 s.
 
-    This period does not become longer, because a later Stop may arrive.
+    After each fault, the driver sends Stop again. The time between two faults does not grow, so
+    that the driver goes on sending Stop: a later Stop may reach the board.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)

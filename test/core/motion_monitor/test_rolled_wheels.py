@@ -40,9 +40,10 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """``rolled`` is the sum of all displacements in the robot's axes, whatever axes the board uses.
+    """``rolled`` is the sum of all displacements of the robot, in the robot's own axes.
 
-    Converted to wheel angles and back, ``rolled`` still has the turn of the body.
+    The board may report displacements in the axes of the earth or of the robot. If ``rolled`` is
+    converted to wheel angles and back, its turn stays the same.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):

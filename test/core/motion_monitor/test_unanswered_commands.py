@@ -58,9 +58,10 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 @pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """If a robot has obeyed in between, the driver reports a second time that it does not obey.
+    """A robot ignores a first drive command, obeys a second one, and ignores a third one.
 
-    The line to the board is cut in the first and the third of three drives.
+    The line to the board is cut in the first and in the third drive, so the robot does not move.
+    The driver reports this each time.
     """
     bench = standing()
     for hears in (False, True, False):

@@ -94,7 +94,10 @@ def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]
 
 @given(small_moves, headings, st.sampled_from(["earth", "body"]))
 def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: str) -> None:
-    """The robot moves with a constant twist. The twist is measured exactly, in the body's axes."""
+    """The robot moves with a constant twist. The odometry estimates exactly this twist.
+
+    The estimate is the displacement divided by its duration, 40 ms, in the body's axes.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     for _ in range(3):

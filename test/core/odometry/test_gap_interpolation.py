@@ -170,8 +170,9 @@ def test_a_board_that_restarts_in_full_motion_leaves_room_for_the_way_to_rest(
 def test_a_board_that_restarts_late_in_a_silence_leaves_room_for_the_way_driven_before_it() -> None:
     """After 3 s without data, a board reports that it restarted 0.2 s ago.
 
-    Until the restart, the robot may have continued at 0.5 m/s. The covariance includes half of this
-    distance.
+    In the 2.8 s before the restart, the robot may have continued to drive at 0.5 m/s and to turn at
+    1 rad/s. The standard deviations of x and yaw are larger than half of this distance and half of
+    this turn.
     """
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
@@ -225,7 +226,10 @@ def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
 
 
 def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> None:
-    """After a reset of the odometry, a loss that an earlier pose showed adds no motion."""
+    """A pose shows that five displacements were lost. Then the odometry is reset.
+
+    The lost motion took place before the reset, so odom contains only the motion after the reset.
+    """
     odometry, trip = Odometry(SETTINGS), Trip()
     for _ in range(4):
         odometry.displace(trip.move(0.02, 0.0, 0.0), 0.0)
@@ -239,10 +243,11 @@ def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> No
 
 
 def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> None:
-    """If two poses disprove a suspected restart, the odometry estimates the motion that was lost.
+    """A displacement seems to show a restart of the board, and two later displacements are lost.
 
-    Two displacements are lost. ``use_board_pose`` is False, so the odometry continues the last
-    motion.
+    Two poses then show that the board has not restarted. So the odometry estimates the lost motion.
+    It does not take this motion from the poses, because ``use_board_pose`` is False, but continues
+    the last motion.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
     attach(odometry, trip.pose)
