@@ -133,7 +133,11 @@ class Bench:
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Change these fields of OmniBotSettings. Other fields get values that fit the board."""
+        """Replace the driver's OmniBotSettings. ``changed`` contains the fields to set.
+
+        ``delta_frame`` and ``delta_period_s`` are those of the simulated board. All other fields
+        get their default values.
+        """
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
@@ -146,7 +150,10 @@ class Bench:
         self.session.configure(self.settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:
-        """Return the bytes that the driver writes at shutdown before it closes the port."""
+        """Return the bytes that the driver writes in its shutdown sequence.
+
+        After these bytes, the driver closes the port.
+        """
         return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test bench for a stream of set-points whose frames are arbitrary bytes."""
+"""Test bench for a stream of set-points. Short texts such as ``go`` stand for the frames."""
 
 from typing import Any
 
@@ -26,7 +26,10 @@ TIMEOUT_S = 0.5
 
 
 class Words:
-    """A substitute for an encoder. It accepts bytes as orders, and returns them unchanged."""
+    """A substitute for the code that turns orders into packets. Orders can be bytes.
+
+    The bytes are returned unchanged.
+    """
 
     def stop(self) -> Packets:
         return packed(STOP)

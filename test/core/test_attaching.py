@@ -48,9 +48,10 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
     lost: tuple[int, ...], turn: float, frame: str
 ) -> None:
-    """Motion that was interpolated before the first two poses agreed stays in the odometry.
+    """The driver starts while the robot moves. Displacements are lost before two poses agree.
 
-    The driver starts while the robot moves. The later poses agree with the odometry.
+    The odometry interpolates the lost motion, and keeps this motion when two poses agree with each
+    other. All later poses agree with the odometry.
     """
     odometry, trip, missing, estimates = Odometry(SETTINGS), Trip(0.7), 0, []
     for number in range(60):
@@ -67,10 +68,10 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 
 
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
-    """A damaged pose leaves no error, although the next pose seems to show a restart.
+    """A pose has damaged values and a damaged count. After the next pose, odom has no error.
 
-    The damaged pose also has a wrong count, so the right count of the next pose looks like that of
-    a restarted board. The next pose lies where the odometry expects it, and removes the error.
+    The right count of the next pose looks like that of a restarted board, because the count before
+    it was wrong. But this pose lies where the odometry expects it, and removes the error.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):
@@ -141,9 +142,10 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The first poses come late, so the odometry assumes heading 0 until they arrive.
+    """The first poses come after a second, in which the odometry has assumed heading 0.
 
-    The poses agree, so later motion is computed with their heading. Odom does not jump.
+    These poses agree with each other, so the odometry uses their heading for later motion. Odom
+    does not jump.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):

@@ -217,9 +217,10 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_again(
     bench: AnyBench,
 ) -> None:
-    """Without a proof of a stop, Stop is repeated for 5 s, in case the line works again.
+    """The driver gets no proof of a stop, so it repeats Stop for 5 s, in case the line works again.
 
-    Here, the robot receives again after 4 s, but the driver still receives nothing.
+    After 4 s, the board receives data again, but the driver still receives nothing. The robot
+    stops.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False

@@ -88,10 +88,10 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
-    """The board restarts in a pause, and the robot rests. Odom does not move to the new origin.
+    """A paused board restarts while the robot rests. Odom does not move to the board's new origin.
 
-    The first frames of the restarted board are lost. So the first count that arrives is larger than
-    the last count before the restart.
+    The driver misses the first frames of the restarted board, about 4 s. So the first count that
+    the driver gets is larger than the last count before the restart.
     """
     on = line(0, frame=frame)
     on.drives = False
@@ -151,9 +151,10 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Displacements are lost, then the odometry is reset. Odom does not contain the lost motion.
+    """Displacements are lost. The odometry is reset before a pose has shown the lost motion.
 
-    The board's next pose comes after the reset, and contains the lost motion.
+    The board's next pose contains the lost motion, but odom contains only the motion after the
+    reset.
     """
     for seed in range(4):
         on = line(seed)

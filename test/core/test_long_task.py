@@ -55,7 +55,11 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task ends when a driven robot is stopped, but not if the robot was at rest all the time."""
+    """A long task does not end while the robot is at rest from the beginning of the task.
+
+    Later, the robot is driven. When the robot is then stopped, the task fails, and the message says
+    that the robot was stopped.
+    """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)
     for driven in (False, False, True, True):

@@ -21,9 +21,10 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """The driver pauses with Stop, and then one P when new data shows that the board still runs.
+    """The user requests a pause. The driver sends Stop, waits for new data, and sends P once.
 
-    The «Paused» text of the board confirms the pause.
+    The new data shows that the board still runs: P would resume a paused board. The «Paused» text
+    of the board confirms the pause.
     """
     bench.drive(0.5)
     bench.run(0.3)
@@ -81,10 +82,11 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """The «Paused» text of an earlier pause by another program does not confirm a user's pause.
+    """Another program pauses the board. The user requests a pause before the «Paused» text arrives.
 
-    The user's pause makes the driver send P, which resumes the board. The text arrives only after
-    this P. So the driver sends P again.
+    The driver does not know that the board is paused. It sends P, which resumes the board. The
+    «Paused» text of the first pause arrives only now, and does not confirm the user's pause. So the
+    driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

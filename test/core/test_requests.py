@@ -85,10 +85,10 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """If the port is lost before the driver has written a request, it never writes the request.
+    """The port is lost before the driver has written a requested reset. The reset is never written.
 
-    The request is a reset, for which the driver would write Stop and R. When the port opens again,
-    the driver writes only the opening and S.
+    For a reset, the driver would write Stop and R. When the port is open again, the driver writes
+    only Stop, as after each opening, and S.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -217,9 +217,10 @@ def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: flo
 
 
 def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
-    """A paused board does not receive R, and three of its «Paused» texts are lost.
+    """The user requests a reset, but the paused board receives nothing, so the reset fails.
 
-    The number in the next text is too high for a restart. The reset fails.
+    The driver misses three «Paused» texts of the board. The number in the next «Paused» text is too
+    high for a restarted board.
     """
     bench = Bench(run=False)
     bench.open()

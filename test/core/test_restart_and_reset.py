@@ -39,10 +39,10 @@ def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]
 
 @pytest.mark.parametrize("lost", [20, 25])
 def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
-    """If only the pose shows that the board has restarted in a gap, odom does not jump.
+    """The board restarts in a gap, and only the next pose shows the restart. Odom does not jump.
 
-    By chance, the count of the first delta after the gap shows no restart. The gap is long enough
-    for a drive to the board's new origin.
+    By chance, the count of the first delta after the gap does not show the restart. In the time of
+    the gap, the robot could have driven to the place where the board reports it: the origin.
     """
     odometry, estimates = driven(75, 0.004)
     before = last(estimates)
@@ -78,10 +78,11 @@ def test_a_restart_that_the_pose_shows_after_a_long_gap_leaves_a_small_uncertain
 def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
     ambiguous: bool, told_m: float, x_m: float
 ) -> None:
-    """A pose exactly at the board's new origin shows a restart, so odom keeps its pose.
+    """After a gap, a board's pose at the origin shows a restart of the board. Odom does not move.
 
-    The counters of the board can mean a restart or a loss of frames. Odom moves to the pose if the
-    pose lies 1 cm beside the origin, or if the counters exclude a restart.
+    The counters of the board fit both a restart and a loss of frames (``ambiguous``). If the
+    counters exclude a restart, or if the board's pose lies 1 cm beside the origin, odom moves to
+    the board's pose.
     """
     odometry, estimates = driven(75, 0.004)
     for number in range(127, 177):
@@ -114,11 +115,12 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_shor
 ) -> None:
     """The robot drives 1.2 m. After a gap of 0.6 s, the board's pose is at the origin.
 
-    If the counters of the board can mean a restart (``ambiguous``), this pose shows a restart: odom
-    adds only the assumed motion in the gap. If the counters exclude a restart, the robot has driven
+    If the counters of the board fit a restart (``ambiguous``), this pose shows a restart: odom adds
+    only the assumed motion in the gap. If the counters exclude a restart, the robot has driven back
     to the origin, and odom moves there.
 
-    Bug: after a restart, odom moved to the board's old origin if the robot could have driven there.
+    Bug: after a restart, odom moved back to the start of the drive if the robot could have driven
+    there.
     """
     odometry, estimates = driven(75, 0.016)
     for number in range(90, 140):
@@ -161,12 +163,12 @@ def test_a_board_that_restarts_goes_on_from_here(
 def test_a_disproved_restart_leaves_no_more_uncertainty_than_the_motion_that_was_lost(
     lost_m: float, frame: str
 ) -> None:
-    """The counter seems to have restarted, but the next pose shows that the board has not.
+    """A delta seems to show a restart, but the next poses show that the board has not restarted.
 
-    ``use_board_pose`` is False, so the pose does not correct odom. Motion by ``lost_m`` is missing
-    in odom. The covariance contains an error of this size in any direction, and no more.
+    The robot has moved by ``lost_m`` unnoticed. ``use_board_pose`` is False, so the poses do not
+    correct odom. The covariance covers an error of ``lost_m`` in any direction, and no more.
 
-    Bug: after such a suspicion, the yaw stayed uncertain by 0.3 rad.
+    Bug: after a wrong suspicion of a restart, the yaw stayed uncertain by 0.3 rad.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip(0.7)
     attach(odometry, trip.pose)
@@ -240,9 +242,10 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_a_reset_after_a_gap_leaves_no_wrong_heading(
     lost: int, use_board_pose: bool, frame: str
 ) -> None:
-    """The odometry is reset after a gap at the end of a turn. Then odom has the right direction.
+    """A robot ends a turn in a gap. After the gap, the odometry is reset, and odom has no error.
 
-    The gap hides the robot's heading in the board's frame, until the next poses show the heading.
+    The odometry does not know the robot's heading in the board's frame until the next poses show
+    it.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
     attach(odometry, trip.pose)
@@ -266,11 +269,13 @@ def test_a_reset_after_a_gap_leaves_no_wrong_heading(
 def test_a_gap_belongs_to_the_side_of_a_reset_on_which_most_of_it_lies(
     duration_s: float | None,
 ) -> None:
-    """If the odometry is reset near the end of a gap, odom does not contain the lost motion.
+    """A reset of the odometry in a gap of 3 s decides whether odom contains the lost motion.
 
-    If it is reset near the beginning, odom contains the lost motion. The gap lasts 3 s. In both
-    cases, the odometry makes an estimate for the displacement after the gap. If this estimate does
-    not contain the lost motion, its pose is zero, and its twist is unknown.
+    If the reset is near the beginning of the gap, odom contains the lost motion. If the reset is
+    near the end, odom does not contain the lost motion.
+
+    In both cases, the odometry publishes one estimate for the first displacement after the gap.
+    After a reset near the end, this estimate has a pose of zero and an unknown twist.
     """
     for now, way_m in ((3.9, 0.0), (1.1, 0.75)):
         odometry, trip = Odometry(SETTINGS), Trip()

@@ -107,10 +107,11 @@ def test_a_text_says_that_the_board_is_paused() -> None:
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A «Paused» text shows an uninterrupted pause if the previous frame is a «Paused» text, too.
+    """A «Paused» text shows an uninterrupted pause if the frame before it is a «Paused» text, too.
 
-    At most nine texts may be lost between these two. If more texts were lost, or another frame
-    came, the board may have run or restarted.
+    The numbers in the two texts must show that at most nine texts were lost in between. If more
+    texts were lost, or the frame before the text is another frame, the board may have run or
+    restarted.
     """
     first, *more, last = readings(bot(), *map(PausedFrame, (255, 0, 2, 12, 23)))
     assert [first, last] == 2 * [PausedReading()]

@@ -115,9 +115,10 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """A shock before and after a delta, and then a silence, cost no frame.
+    """A shock makes the IMU readings jump. The decoder still returns each frame.
 
-    The adapter delivers the IMU frame after the delta in two parts.
+    The shock lasts for two IMU frames, with a delta between them. The adapter delivers the second
+    IMU frame in two parts, and the line is silent after it.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
@@ -144,7 +145,10 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """A frame whose last byte may begin a header is returned with the next frame's first byte."""
+    """A frame whose last byte may begin a header is returned when the next frame begins.
+
+    The decoder holds the frame until the first byte of the next frame arrives.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)

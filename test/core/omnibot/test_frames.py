@@ -204,7 +204,7 @@ def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
 def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -> None:
     """A coordinate is rounded to a 32-bit float.
 
-    A coordinate that is too large for a 32-bit float is refused.
+    A coordinate that is too large for a 32-bit float is rejected.
     """
     wide = PoseFrame(x, pose.y, pose.theta, pose.seq)
     try:
@@ -235,14 +235,14 @@ def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -
     ids=str,
 )
 def test_a_value_that_does_not_fit_its_field_is_refused(frame: Frame | CommandFrame) -> None:
-    """A value is too large for its field. Encoding is refused, and the message names the frame."""
+    """A value that does not fit its field is rejected, and the message names the kind of frame."""
     with pytest.raises(FrameError, match=type(frame).__name__):
         encode(frame)
 
 
 @given(st.one_of(frames, commands), st.integers(0, 14))
 def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: int) -> None:
-    """A frame that is cut anywhere is refused."""
+    """The bytes of a frame whose end is missing are rejected, wherever the frame was cut."""
     data = encode(frame)
     with pytest.raises(FrameError, match="not exactly one frame"):
         decode(data[: min(length, len(data) - 1)])
@@ -252,7 +252,7 @@ def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: i
 def test_a_frame_and_something_more_is_not_a_frame(
     frame: Frame | CommandFrame, more: bytes
 ) -> None:
-    """A frame with extra bytes after it is refused."""
+    """A frame with extra bytes after it is rejected."""
     data = encode(frame)
     with pytest.raises(FrameError, match="not exactly one frame"):
         decode(data + more)
@@ -275,7 +275,7 @@ def test_a_frame_and_something_more_is_not_a_frame(
     ],
 )
 def test_bytes_of_no_frame_are_refused(data: bytes) -> None:
-    """Bytes that form no frame are refused, and the message contains the bytes."""
+    """Bytes that form no frame are rejected, and the message contains the bytes."""
     with pytest.raises(FrameError, match=data.hex(" ") or "no bytes"):
         decode(data)
 

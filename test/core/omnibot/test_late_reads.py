@@ -41,11 +41,12 @@ def arrivals(ticks: tuple[bytes, ...]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: tuple[bytes, ...], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """Yield the reads of a reader that pauses once, for ``stop_s``, after ``place`` bytes.
+    """Yield the reads of a reader that reads ``place`` bytes, pauses for ``stop_s``, and goes on.
 
     ``most``: largest number of bytes in a read.
 
-    ``piece``: number of new bytes for which the reader waits when it has read all bytes.
+    ``piece``: after the reader has read all bytes that have arrived, it waits for this number of
+    new bytes.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -77,9 +78,10 @@ def heard(reads: Iterable[Read], begun: FrameDecoder | None = None) -> list[Fram
 
 
 def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
-    """Return a list of frames for each reader.
+    """Decode the reads of several readers separately, and return a list of frames for each reader.
 
-    The first reads are the same for all readers, so they are decoded only once.
+    A reader takes the bytes of the line in reads. As long as the reads of all readers are the same,
+    they are decoded only once.
     """
     lists = [list(reads) for reads in readers]
     made, found, common = FrameDecoder(), [], 0
@@ -192,9 +194,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The beginning of one frame and the end of another have the length of one frame.
+    """The line is cut in the middle of one frame, and works again in the middle of a later frame.
 
-    The decoder rejects these parts, because a pause is between them.
+    Together, the two parts that arrive have the length of one frame. The decoder rejects them,
+    because there is a pause between them.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):

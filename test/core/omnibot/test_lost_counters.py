@@ -89,9 +89,9 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 25, 26, 60, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """After a gap, no step of odom is faster than 2 m/s or 8 rad/s.
+    """After a gap, no step from one odom message to the next is faster than 2 m/s or 8 rad/s.
 
-    The first step contains the motion of the gap, but lasts longer than the gap.
+    The first step contains the motion of the gap, and covers more time than the gap.
     """
     for seed in range(5 if lost < 60 else 2):
         _, estimates = over_a_gap(lost, seed, frame)

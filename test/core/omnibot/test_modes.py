@@ -46,7 +46,10 @@ def test_nothing_is_believed_before_anything_is_heard() -> None:
 
 @pytest.mark.parametrize(("happening", "mode"), list(product(HEARD, Mode)))
 def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode) -> None:
-    """Any data may arrive in any mode, so the table has an entry for each combination."""
+    """The mode table has an entry, the next mode, for any data from the board in any mode.
+
+    No combination may be missing, because any data may arrive in any mode.
+    """
     made = tracker(mode)
     made.apply(happening)
     assert made.mode is TRANSITIONS[happening][mode]

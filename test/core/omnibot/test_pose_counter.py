@@ -10,7 +10,10 @@ from omnibot_driver.core.omnibot.sequence import Sequence, Step
 
 
 def counted(deltas: int) -> Sequence:
-    """Return a sequence that has received ``deltas`` from 0 s on, and their poses."""
+    """Return a sequence that has received ``deltas`` deltas, and a pose after every fifth delta.
+
+    The first delta arrives at 0 s, and the others follow every 0.04 s.
+    """
     sequence = Sequence()
     for count in range(deltas):
         sequence.delta(count % 256, count * 0.04)
@@ -64,13 +67,14 @@ def test_a_pose_after_a_long_gap_shows_the_losses_and_no_restart(poses: int) -> 
 def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restart(
     uptime: int, ambiguous: bool
 ) -> None:
-    """A pose after a long gap is ambiguous if both counters fit a restart, but also a mere loss.
+    """A pose after a gap is ambiguous if the counters fit both a restart and a loss of frames.
 
-    The board sends ``uptime`` deltas, is silent for 2.1 s, and counts from zero again.
+    The board sends ``uptime`` deltas, is silent for 2.1 s, restarts, and counts from zero again.
 
-    * 1228 deltas: by chance, both counters also fit a loss without a restart.
-    * 1150 deltas: both counters show the restart.
-    * 972 deltas: only the counter of the poses shows the restart.
+    * ``uptime`` is 1228: by chance, the counters of deltas and poses also fit a mere loss of
+      frames. The pose is ambiguous.
+    * ``uptime`` is 1150: both counters show the restart.
+    * ``uptime`` is 972: only the counter of the poses shows the restart.
     """
     sequence = counted(uptime)
     begun_s = uptime * 0.04 + 2.1
@@ -86,11 +90,12 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     interrupt: Callable[[Sequence], None],
 ) -> None:
-    """After a gap of 2.1 s, the delta and pose counters fit a restart and a loss of all deltas.
+    """After a gap of 2.1 s, the counters fit both a restart of the board and a loss of frames.
 
-    The board is paused, or the port is opened again, between the gap and the first pose after it.
-    This pose is still ambiguous. If the driver took the pose for certain, ``odom`` would move to
-    the old origin after a restart.
+    Between the gap and the first pose after it, the board is paused, or the port is opened again.
+    The pose is still ambiguous. If the driver took this pose of a restarted board for a pose of a
+    board that continued, ``odom`` would move to the place where the robot was when the board first
+    started.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
@@ -106,11 +111,15 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
 def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
     uptime: int, restarted: bool
 ) -> None:
-    """The board sends ``uptime`` deltas. In a gap of 12.4 s it restarts and sends 270 deltas.
+    """The board restarts in a gap, and by chance the delta counter looks as if it had continued.
 
-    The counter of the deltas wraps in the gap, and by chance it continues the old count. If
-    ``uptime`` is 217, the counter of the next pose shows the restart. If ``uptime`` is 1241, the
-    counter of the pose also continues its old count, so the pose is ambiguous.
+    The board sends ``uptime`` deltas. A gap of 12.4 s follows, in which the board restarts and
+    sends 270 deltas. The expected result depends on ``uptime``:
+
+    * ``uptime`` is 217: the pose counter does not look as if it had continued, so the next pose
+      shows the restart.
+    * ``uptime`` is 1241: the pose counter also looks as if it had continued, so the next pose is
+      ambiguous.
     """
     sequence = counted(uptime)
     for count in range(270, 275):
@@ -125,12 +134,11 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
 def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     restarted: bool, silent_s: float
 ) -> None:
-    """After a silence of 4 s or 7 s, the next count may be that of a board that has restarted.
+    """After a silence, a delta has the next count, but a restarted board could have it, too.
 
-    A restarted board may have counted up to this number, so the driver supposes a restart. The
-    restart is doubtful until the next pose. The counter of this pose shows the restart, or it
-    continues, because the board was only silent. This is also true if the silence is nearer to the
-    10.24 s in which the delta counter wraps than to 0.
+    The silence lasts 4 s or 7 s. The driver assumes a restart, and marks it as doubtful. The
+    counter of the next pose shows whether the board has restarted or was only silent. The silence
+    of 7 s is nearer to 10.24 s, after which the delta counter wraps, than to 0.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
@@ -145,12 +153,12 @@ def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
 def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_begins_anew(
     number: int, restarted: bool
 ) -> None:
-    """A pose confirms a restart that a delta's count shows, if the pose's own counter is near 0.
+    """A delta seems to show a restart. A pose confirms the restart if the pose counter is near 0.
 
-    In two other cases, the pose shows no restart:
+    In two other cases, the pose does not show the restart:
 
-    * The pose counter continues its old count: the count of the delta may be damaged.
-    * The pose counter fits neither a restart nor its old count.
+    * The pose counter continues its old count. The counter of the delta may be damaged.
+    * The pose counter is neither near 0 nor continues its old count.
     """
     sequence = counted(200)
     after_s = 199 * 0.04 + 2.1
@@ -188,9 +196,10 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """A delta with the count 0 may show a restart. A pose with the count 0 confirms the restart.
+    """The board restarts. The delta counter 0 could also be the old counter that arrives too early.
 
-    The delta after this pose has the count 1, and the driver counts no delta as lost.
+    The pose after this delta also has the counter 0, so the pose shows the restart. The next delta
+    has the counter 1, and the driver counts no delta as lost.
     """
     sequence = Sequence()
     for count in range(171):
@@ -252,9 +261,9 @@ def test_after_an_hour_the_pose_counter_does_not_tell_of_a_restart(first: int) -
 
 
 def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> None:
-    """A pose that is the first frame after a reconnection shows no losses.
+    """The first frame after a reconnection is a restarted board's pose. It shows no losses.
 
-    The board has restarted, so the difference of the pose counters means nothing.
+    The pose counter began at zero again, so its difference from the old counter means nothing.
     """
     sequence = reopened()
     assert sequence.pose(3, 205 * 0.04 + 60.0).lost == 0
@@ -301,9 +310,10 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """A loss that a pose shows is not counted again with the next delta.
+    """A pose shows that a delta is lost. The next delta does not count this loss again.
 
-    The pose and the delta are decoded late, almost at the same time.
+    This delta arrives only 20 ms after the pose, which is too early for its counter. But the pose
+    has explained the counter, so the driver does not take the counter for a damaged one.
     """
     sequence = Sequence()
     for count in range(11):

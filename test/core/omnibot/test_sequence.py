@@ -34,19 +34,20 @@ def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """The host hangs for up to 5 s. The next delta comes late, but its SEQ is the next one.
+    """The host hangs for up to 5 s, so the next delta arrives late. Its SEQ continues the count.
 
-    No delta is regarded as lost. The driver does not assume a restart, because the board sends no
-    poses, and only a pose could disprove a restart.
+    The driver counts no delta as lost, and does not assume a restart. The board sends no poses, so
+    nothing could disprove a restart that the driver had assumed wrongly.
     """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The next count after a pause shows no loss. The duration of its delta is unknown.
+    """The first delta after a pause continues the count. The driver counts no delta as lost.
 
-    The count 0 is taken for a restart, because a restarted board begins at 0.
+    The duration of this delta is unknown. If its count is 0, the driver assumes a restart, because
+    a restarted board begins at 0.
     """
     sequence = begun(count)
     sequence.pause()
@@ -58,9 +59,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """After a pause, only the next count, if it is not 0, shows that the board has not restarted.
+    """After a pause, the driver suspects a restart if the first delta does not continue the count.
 
-    After any other count, the driver suspects a restart, and the board's pose decides.
+    If the count of the first delta is 0, the driver suspects a restart in any case. The board sends
+    poses, and the next pose shows whether the board has restarted.
     """
     sequence = Sequence()
     for number in range(11):
@@ -79,10 +81,10 @@ def test_after_a_pause_any_count_but_the_next_one_may_be_that_of_a_restarted_boa
 def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_board(
     count: int, first: int, after_s: float
 ) -> None:
-    """The board sends no poses, which could disprove a restart after a pause.
+    """If a board sends no poses, only a low count after a pause makes the driver suspect a restart.
 
-    If the board has not restarted, the next count shows how many deltas are lost. The driver
-    suspects a restart only if the count is not larger than this number of deltas.
+    A count is low if a restarted board would have lost at most as many deltas as a board that
+    continued. The driver is cautious, because only a pose could disprove a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -108,10 +110,10 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 def test_a_restart_after_a_pause_is_doubtful_if_a_board_that_continued_lost_fewer_deltas(
     before: int, first: int, doubtful: bool
 ) -> None:
-    """The first count after a pause is the next count, or the driver assumes a restart.
+    """After a pause, the driver assumes a restart if the first delta does not continue the count.
 
     The restart is doubtful if a board that continued would have lost fewer deltas than a restarted
-    one. If the first count is the next count, the board has not restarted.
+    board.
     """
     sequence = begun(before - 10)
     for number in range(11):

@@ -26,7 +26,10 @@ Change = Callable[["Robot"], None]
 
 
 class Robot:
-    """The figures of a healthy robot. The method ``seconds`` makes one diagnosis per second."""
+    """A healthy robot, described by the figures for its diagnosis.
+
+    ``seconds`` lets seconds pass, and makes a diagnosis in each of them.
+    """
 
     def __init__(self) -> None:
         self.diagnosis = Diagnosis("its power, cable and baudrate")

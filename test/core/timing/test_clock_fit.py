@@ -67,7 +67,7 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """Every twentieth read is late. It gives a lower bound later than the true time of the tick.
+    """Every twentieth read is late, so its lower bound for the time of the tick is too late.
 
     These wrong lower bounds do not make the fitted clock later.
     """
@@ -82,10 +82,10 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """Lower bounds that contradict upper bounds are discarded.
+    """A lower bound for the time of a tick is discarded if it contradicts the upper bounds.
 
-    An upper bound is always right, because no read comes before its tick. Late reads give wrong
-    lower bounds.
+    An upper bound is always right, because each read comes after its tick. A lower bound is wrong
+    if the read was late.
     """
     _, late_s = followed(
         0.0,
