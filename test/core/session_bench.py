@@ -133,7 +133,7 @@ class Bench:
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Replace the driver's OmniBotSettings. ``changed`` contains the fields to set.
+        """Replace the driver's OmniBotSettings. ``changed``: values of fields.
 
         ``delta_frame`` and ``delta_period_s`` are those of the simulated board. All other fields
         get their default values.

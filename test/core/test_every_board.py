@@ -219,8 +219,7 @@ def test_stop_is_still_repeated_when_a_line_of_which_nothing_is_heard_works_agai
 ) -> None:
     """The driver gets no proof of a stop, so it repeats Stop for 5 s, in case the line works again.
 
-    After 4 s, the board receives data again, but the driver still receives nothing. The robot
-    stops.
+    After 4 s, the board receives data again, so the robot stops. The driver still receives nothing.
     """
     bench.drive_on()
     bench.speaks = bench.hears = False

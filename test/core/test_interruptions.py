@@ -90,8 +90,8 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 def test_a_restart_in_a_pause_moves_nothing_whatever_count_is_heard_first(frame: str) -> None:
     """A paused board restarts while the robot rests. Odom does not move to the board's new origin.
 
-    The driver misses the first frames of the restarted board, about 4 s. So the first count that
-    the driver gets is larger than the last count before the restart.
+    The restarted board sends frames for 4 s, and the driver misses these frames. So the first count
+    that the driver gets is larger than the last count before the restart.
     """
     on = line(0, frame=frame)
     on.drives = False

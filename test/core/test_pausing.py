@@ -84,8 +84,8 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 ) -> None:
     """Another program pauses the board. The user requests a pause before the «Paused» text arrives.
 
-    The driver does not know that the board is paused. It sends P, which resumes the board. The
-    «Paused» text of the first pause arrives only now, and does not confirm the user's pause. So the
+    The driver does not know that the board is paused. It sends P, which resumes the board. Only
+    now, the «Paused» text of the first pause arrives. It does not confirm the user's pause. So the
     driver sends P again.
     """
     data = bench.board.step()

@@ -251,8 +251,8 @@ def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wa
 ) -> None:
     """After any requests, commands and faults, the robot rests and the board has the wanted mode.
 
-    Each request gets its answer in time. The driver sends P only if it takes the board for a
-    running board.
+    Each request gets its answer in time. The driver sends P only when it believes that the board is
+    running.
     """
     walk = Walk(seed, latency_s, BoardSettings(boot_time_s=boot_time_s, seed=seed), run=run)
     walk.open()

@@ -219,8 +219,8 @@ def test_the_first_text_of_a_connection_does_not_show_a_restart(connected_s: flo
 def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
     """The user requests a reset, but the paused board receives nothing, so the reset fails.
 
-    The driver misses three «Paused» texts of the board. The number in the next «Paused» text is too
-    high for a restarted board.
+    Three «Paused» texts of the board are lost. The number in the next «Paused» text is too high for
+    a restarted board, so the driver sees that the board has not obeyed.
     """
     bench = Bench(run=False)
     bench.open()

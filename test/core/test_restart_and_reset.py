@@ -41,8 +41,8 @@ def driven(deltas: int, step_m: float) -> tuple[Odometry, list[OdometryEstimate]
 def test_a_restart_that_only_the_pose_shows_is_no_motion_in_the_gap(lost: int) -> None:
     """The board restarts in a gap, and only the next pose shows the restart. Odom does not jump.
 
-    By chance, the count of the first delta after the gap does not show the restart. In the time of
-    the gap, the robot could have driven to the place where the board reports it: the origin.
+    By chance, the count of the first delta after the gap does not show the restart. The gap is so
+    long that the robot could also have driven to the board's old origin.
     """
     odometry, estimates = driven(75, 0.004)
     before = last(estimates)

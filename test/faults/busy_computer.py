@@ -31,9 +31,10 @@ The board has sent these frames before the comparison, but the driver may publis
 comparison.
 """
 REACH: Final = 200
-"""Distance from the last match, in frames, below which sent frames are compared with a message.
+"""Limit, in frames, of the search for the sent frame that equals a published message.
 
-If none of these frames equals the published message, the message is wrong.
+The search begins after the last frame that was found. If no frame within the limit equals the
+message, the message is wrong.
 """
 
 

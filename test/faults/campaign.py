@@ -39,7 +39,7 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Number of drivers that are tested with each group of stops on a line that loses bytes."""
+"""Number of drivers for each group of stops in ``LIVES``, on a line that loses bytes."""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -74,7 +74,10 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Add another outcome. Rows with the same name are combined into one row."""
+        """Add the rows, complaints and numbers of another outcome to this outcome.
+
+        Rows with the same name are combined into one row.
+        """
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:
@@ -204,7 +207,8 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test how the robot stops if the line loses bytes on the way to the board.
 
-        ``number_of_life``: index in ``LIVES`` of the series of stops that each driver carries out.
+        ``number_of_life``: index in ``LIVES``. It selects the group of stops that each driver
+        carries out.
 
         ``numbers``: one number for each driver, which selects the lost bytes.
         """
@@ -218,7 +222,7 @@ class Campaign(Outcome):
                     self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
-        """Test a drive on a busy computer with an undamaged line. Repeat this in every round."""
+        """Test ``ROUNDS`` drives on a busy computer, with an undamaged line."""
         row = self.row(
             f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
         )
@@ -317,7 +321,7 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 
 
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
-    """Run in parallel those pieces in ``wanted`` that apply to the board.
+    """Run those pieces of the campaign in ``wanted`` that apply to the board, in parallel.
 
     Return their results as one ``Outcome``, with rows in the order of ``wanted``.
     """

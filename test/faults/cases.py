@@ -195,9 +195,10 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 
 
 def estop(rig: Rig) -> None:
-    """Latch the e-stop. While commands continue, the board reboots and the cable is pulled.
+    """Latch the e-stop. Then reboot the board and pull the cable while commands continue.
 
-    The robot must stay at rest, also after the e-stop is released.
+    The robot must stay at rest. Then the commands end, and the e-stop is released. The robot must
+    still stay at rest.
     """
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)

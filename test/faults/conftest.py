@@ -20,7 +20,7 @@ def _ros() -> Iterator[None]:
 def lenience() -> dict[str, float]:
     """Return values of ``grace_s``, ``ends_within_s`` and ``rest_s`` (s) for a busy computer.
 
-    ``make faults`` uses the defaults of ``Rig`` instead. A node that continues to command
-    would send six commands within ``rest_s``, so the rig would notice these commands.
+    ``make faults`` uses the defaults of ``Rig`` instead. ``rest_s`` is long enough to notice a
+    driver that does not stop the robot: such a driver would send six commands in this time.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.3}

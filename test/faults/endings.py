@@ -133,9 +133,9 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """Plug in the cable again, and send SIGINT before the driver has opened the port.
+    """Plug in the cable again, and send SIGINT to the driver before it has opened the port.
 
-    The robot still carries out its last command.
+    At this time, the robot still carries out its last command, so the driver must stop the robot.
     """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")

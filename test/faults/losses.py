@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops of the robot while the line loses bytes on the way to the board, in real time.
+"""Check, in real time, that the robot stops while the line loses bytes on the way to the board.
 
 The losses continue until the end of the test. In simulated time, test/integrity/outbound.py
 measures the rate of failures.

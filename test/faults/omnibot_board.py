@@ -46,9 +46,9 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Return the settings of the board with this number, for a line that loses bytes.
+    """Return settings of a simulated board for a line that loses bytes.
 
-    ``number``: selects the receiver, and whether the board obeys an emergency stop.
+    ``number``: selects how the board finds frames, and whether the board obeys an emergency stop.
     """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)

@@ -53,7 +53,10 @@ def sent_odom_key(frame: bytes) -> Key | None:
 
 
 def not_sent(published: Iterable[Key | None], sent: Iterable[Key | None]) -> int:
-    """Return the number of published keys that the board did not send, or sent in another order."""
+    """Return how many published messages the board has not sent, or has sent in another order.
+
+    Each message and each frame is given by its key, the values that are compared. None is ignored.
+    """
     truth = [key for key in sent if key is not None]
     at = missing = 0
     for key in published:

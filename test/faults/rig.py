@@ -160,7 +160,10 @@ class Rig:
         self._terminal.deaf = False
 
     def unplug(self) -> None:
-        """Remove the terminal. The robot continues with its last command."""
+        """Disconnect the board from the driver, as if someone pulled the cable.
+
+        The robot continues with its last command.
+        """
         if self._terminal is not None:
             self._terminal.__exit__(None, None, None)
             self._terminal, self._unplugged_at_s = None, time.monotonic()

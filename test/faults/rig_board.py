@@ -16,10 +16,10 @@ Sent = Callable[[Any], list[bytes]]
 
 @dataclass(frozen=True, kw_only=True)
 class RigBoard:
-    """A kind of board in the campaign.
+    """A kind of board in the fault campaign.
 
-    ``ports``: returns the parameters that name the driver's ports. Its argument is the symbolic
-    link of the board.
+    ``ports``: function that returns the driver's port parameters. Its argument is the name of the
+    port.
 
     ``old_command``: the bytes of a motion command, with which tests fill the port.
 
@@ -27,7 +27,7 @@ class RigBoard:
 
     ``opening``: the first bytes that the board gets after its port is opened.
 
-    ``tuning``: names of parameters. The driver must refuse invalid values of them.
+    ``tuning``: names of parameters. The driver must reject invalid values of them.
 
     ``off_within_s``: longest time from the driver's stop command until the motors are off.
 
@@ -52,11 +52,12 @@ class RigBoard:
     ``lossy``: returns the settings of the n-th board behind a lossy line.
 
     ``line``, ``serve``: functions that make the board's line and its server. ``None`` means a
-    serial line on a terminal.
+    serial line, simulated by a pseudo-terminal.
 
     ``cases``: returns the faults of the n-th round. ``None`` means the faults of a serial line.
 
-    ``steps``: faults of a random walk. ``None`` means the faults of a serial line.
+    ``steps``: the faults from which a random walk chooses. ``None`` means the faults of a serial
+    line.
 
     ``without``: faults and parts of the campaign that do not apply to this board.
     """
@@ -93,5 +94,5 @@ class RigBoard:
 
 
 def load(name: str) -> RigBoard:
-    """Return the campaign's values for the board with this name."""
+    """Return the properties of the board with this name."""
     return cast(RigBoard, import_module(f"{name}_board").BOARD)

@@ -16,13 +16,14 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Let the adapter hold back the driver's data, and then deliver all of it at once.
+    """Let the adapter hold back the bytes to the board, and then deliver all of them at once.
 
     After this delivery, the robot must be at rest.
 
-    ``seconds``: time for which the driver gets commands. The adapter holds the data for 1 s longer.
+    ``seconds``: time for which the user commands the robot while the adapter holds the bytes. The
+    adapter delivers the bytes 1 s after this time.
 
-    ``mute``: whether the driver gets no data from the board while the adapter holds its data.
+    ``mute``: whether the driver gets no data from the board until the delivery.
     """
     rig.drive()
     rig.terminal.deaf = True

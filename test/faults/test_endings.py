@@ -22,9 +22,9 @@ SOME = (
     "SIGKILL while the port is full",
     "a segmentation fault",
 )
-"""Names of the endings that this module tests.
+"""Names of the ways to end the driver that this module tests.
 
-test_driver_endings and test_driver_guard test other endings.
+test_driver_endings and test_driver_guard test other ways.
 """
 
 

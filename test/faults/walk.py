@@ -18,8 +18,11 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""Longest time in s from the end of the commands until the robot must be at rest, with a margin for
-a line that was damaged or cut until then."""
+"""Longest time in s from the end of the commands until the robot must be at rest.
+
+The line to the board may have been cut until the end of the commands, or may still be damaged, so
+this limit has a margin.
+"""
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:

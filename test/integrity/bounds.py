@@ -28,8 +28,9 @@ class Bound:
 
     ``one_wrong_in_hidden``: the same number for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of the intact frames that must be decoded. With 1.0, only the first
-    two intact frames may be missing; for the chunkings in ``BUSY_LOOPS``, 99.9 % suffice.
+    ``delivered``: least share of the intact frames that must be decoded. The value 1.0 means that
+    all intact frames of a stream after its first two must be decoded. For the chunkings in
+    ``BUSY_LOOPS``, the share is at most 0.999.
 
     ``chunkers``: names of the chunkings that have these limits.
     """
@@ -50,14 +51,17 @@ class Bound:
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded with this chunking.
 
-        It is at most 99.9 % for ``BUSY_LOOPS``, where both the adapter and the reader are late.
+        For a chunking in ``BUSY_LOOPS``, a higher share is reduced to 99.9 %, because both the
+        adapter and the reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:
-        """Return whether a score is within the limits.
+        """Return whether the errors that a parser made with a chunking are within the limits.
 
-        For a chunking without limits, return True.
+        If there are no limits for this chunking, return True.
+
+        ``score``: the counts of the parser's decoded, wrong and missing frames.
         """
         if chunker not in self.chunkers:
             return True
@@ -123,7 +127,7 @@ def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
 
 
 def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
-    """Return the score of one fault and one chunking, added over all scenarios."""
+    """Return the sum of a parser's scores over all scenarios, for one fault and one chunking."""
     total = Score()
     for scenario in SCENARIOS:
         total += scores[fault, chunker, scenario]
@@ -131,7 +135,7 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
 
 
 def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
-    """Return the score of one fault and one scenario, added over all chunkings."""
+    """Return the sum of a parser's scores over all chunkings, for one fault and one scenario."""
     total = Score()
     for chunker in chunkings(fault):
         total += scores[fault, chunker, scenario]

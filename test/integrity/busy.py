@@ -40,8 +40,11 @@ SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""Range of the number of bytes after which the stream is cut into another kind of pieces, for
-example into single bytes."""
+"""Shortest and longest segment of a stream, in bytes.
+
+In a segment, all pieces are of one kind, for example single bytes. The next segment can have
+another kind of pieces.
+"""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:
@@ -187,7 +190,7 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""Chunkings in which both adapter and reader are late.
+"""Chunkings for a computer with busy loops, which delay both the adapter and the reader.
 
-The times of their reads hardly show when the bytes arrived.
+The times of the reader's reads hardly show when the bytes arrived.
 """

@@ -2,10 +2,12 @@
 
 """Print the reaction times of the motion monitor, a table for internals/motion_monitor.md.
 
+To print the table, call:
+
     PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-A reaction time begins when the velocity differs from the command by 0.05 m/s or 0.15 rad/s. It
-ends when the driver sends Stop. The times are measured by the simulated clock.
+A reaction time begins when the velocity differs from the command by 0.05 m/s or 0.15 rad/s. It ends
+when the driver sends Stop. The times are measured by the simulated clock.
 """
 
 from collections.abc import Callable

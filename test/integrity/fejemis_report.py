@@ -49,9 +49,11 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``, ``out``: number of values from undamaged and from damaged lines.
+    ``sent``: number of values that are published if the lines are undamaged.
 
-    ``wrong``: number of wrong values from damaged lines.
+    ``out``: number of values that are published if the lines are damaged.
+
+    ``wrong``: number of wrong values among ``out``.
 
     ``odometry``: number of compared odometry messages.
 

@@ -15,14 +15,16 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-If the judge must skip more to find a true frame that equals the decoded one, the two may be equal
-by chance. The judge then also searches for the next decoded frame of the same read. If the skip for
-this frame is also too large, the first decoded frame is wrong.
+The judge skips frames to find a true frame that equals a decoded frame. After a larger skip, the
+two frames may be equal by chance. So the judge also searches for the next decoded frame of the same
+read, after the true frame that was found. If the judge must skip too many frames again, the first
+decoded frame is wrong.
 """
 REACH_BYTES = 600
-"""Distance, in received bytes, from the start of a search for a read's frames to the read.
+"""Number of received bytes before a read at which the search for the read's frames begins.
 
-The search is in the true stream. There, it starts another 300 bytes earlier.
+The judge searches the stream that was sent. In this stream, the search begins another 300 bytes
+earlier.
 """
 
 
@@ -38,7 +40,7 @@ class Score:
     """Number of texts among the intact frames."""
     texts_delivered: int = 0
     missed_beyond_two: int = 0
-    """Number of streams in which an intact frame after the first two is missing."""
+    """Number of streams in which an intact frame is missing after the first two intact frames."""
 
     @property
     def wrong_share(self) -> float:

@@ -286,8 +286,8 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 ) -> None:
     """After the last usual stop (SM or SRM), the driver waits for 0.3 s, then uses the stop port.
 
-    The longest delay of a datagram is 0.3 s. The server could hang if the driver used the stop port
-    directly after a usual stop.
+    A datagram takes at most 0.3 s, so the usual stop has arrived by then. The server could hang if
+    the driver used the stop port directly after a usual stop.
     """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)

@@ -46,7 +46,7 @@ def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> Non
     """The driver reports a left wheel that is stuck in a turn. The covariance covers the error.
 
     Only the right wheel has an encoder. For the same turn of the robot, the right wheel turns twice
-    as far as usual, so the angle by the encoder is wrong.
+    as far as usual, so the turn that the driver computes from the encoder is wrong.
     """
     bench = MartBench("source").ready()
     bench.command(0.0, 0.6, first_s)

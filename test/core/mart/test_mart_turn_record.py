@@ -100,7 +100,7 @@ def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
 def test_the_file_of_another_angle_is_not_used() -> None:
     """The driver does not use the record of a turn for which another angle was requested.
 
-    The record contains the requested angle: 90°. The driver has requested 89°.
+    The record says that 90° were requested, but the driver has requested 89°.
     """
     assert recorded_deg([RECORD], MCL.request("SLOW", 89)) is None
 

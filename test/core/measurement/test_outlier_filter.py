@@ -132,7 +132,8 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
     """A knock drives the sensor to its limit, 2 g. The filter releases this reading at once.
 
-    A single changed bit cannot turn a reading at rest into 2 g, so the reading is not damaged.
+    A single changed bit cannot turn a reading at rest into 2 g, so the filter does not take the
+    reading for a damaged one.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -181,9 +182,8 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement faster than 2 m/s or 8 rad/s is rejected, and counts as lost.
 
-    The rejected displacement has reported two earlier losses, and the next displacement has
-    reported one. With the rejected displacement itself, the next displacement then reports four
-    losses.
+    The next displacement then reports four losses: the rejected displacement, two losses that the
+    rejected displacement has reported, and one loss of its own.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -214,7 +214,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """The filter holds the first displacement after a jump in speed until the next one arrives.
+    """After a jump in speed, the filter holds a displacement until the next displacement arrives.
 
     A pose that comes between the two displacements also waits. The second displacement shows that
     the speed stays high, so the jump may be real, and the filter releases all three readings.

@@ -262,8 +262,8 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
     """While a driven robot does not obey Stop, the monitor reports a fault every 5 s.
 
-    After each fault, the driver sends Stop again. The time between two faults does not grow, so
-    that the driver goes on sending Stop: a later Stop may reach the board.
+    After each fault, the driver sends Stop again. The time between two faults does not grow,
+    because a later Stop may still reach the board.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)

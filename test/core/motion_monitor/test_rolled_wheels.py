@@ -43,7 +43,7 @@ def test_wheels_from_the_bodys_displacements_and_back(
     """``rolled`` is the sum of all displacements of the robot, in the robot's own axes.
 
     The board may report displacements in the axes of the earth or of the robot. If ``rolled`` is
-    converted to wheel angles and back, its turn stays the same.
+    converted to wheel angles and back, its yaw angle stays the same.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):

@@ -46,9 +46,9 @@ def test_nothing_is_believed_before_anything_is_heard() -> None:
 
 @pytest.mark.parametrize(("happening", "mode"), list(product(HEARD, Mode)))
 def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode) -> None:
-    """The mode table has an entry, the next mode, for any data from the board in any mode.
+    """For any data from the board and any present mode, the mode table names the next mode.
 
-    No combination may be missing, because any data may arrive in any mode.
+    No entry may be missing, because any data may arrive in any mode.
     """
     made = tracker(mode)
     made.apply(happening)

@@ -105,8 +105,8 @@ def test_everything_goes_out_behind_zeros() -> None:
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
     """A goal is rejected if the high byte of its x is a letter (S, P or R).
 
-    The letter could start, pause or reset the board. The driver does not send the nearest harmless
-    goal instead, because that goal could be 0.26 m away.
+    Such a letter could start, pause or reset the board. The driver does not send the nearest
+    harmless goal instead, because that goal could be 0.26 m away.
     """
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset if the line"):

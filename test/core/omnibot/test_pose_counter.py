@@ -73,8 +73,8 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 
     * ``uptime`` is 1228: by chance, the counters of deltas and poses also fit a mere loss of
       frames. The pose is ambiguous.
-    * ``uptime`` is 1150: both counters show the restart.
-    * ``uptime`` is 972: only the counter of the poses shows the restart.
+    * ``uptime`` is 1150: both counters show the restart. The pose is not ambiguous.
+    * ``uptime`` is 972: only the counter of the poses shows the restart. The pose is not ambiguous.
     """
     sequence = counted(uptime)
     begun_s = uptime * 0.04 + 2.1
@@ -137,8 +137,8 @@ def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     """After a silence, a delta has the next count, but a restarted board could have it, too.
 
     The silence lasts 4 s or 7 s. The driver assumes a restart, and marks it as doubtful. The
-    counter of the next pose shows whether the board has restarted or was only silent. The silence
-    of 7 s is nearer to 10.24 s, after which the delta counter wraps, than to 0.
+    counter of the next pose shows whether the board has restarted or was only silent. The delta
+    counter wraps every 10.24 s. A silence of 7 s is nearer to this time than to 0.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
@@ -158,7 +158,7 @@ def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_b
     In two other cases, the pose does not show the restart:
 
     * The pose counter continues its old count. The counter of the delta may be damaged.
-    * The pose counter is neither near 0 nor continues its old count.
+    * The pose counter is not near 0, and does not continue its old count.
     """
     sequence = counted(200)
     after_s = 199 * 0.04 + 2.1
@@ -196,7 +196,7 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_tells_of_a_restart_also_while_the_count_before_it_is_ahead_of_the_time() -> None:
-    """The board restarts. The delta counter 0 could also be the old counter that arrives too early.
+    """The board restarts. Its first delta has the counter 0, which could also be a damaged counter.
 
     The pose after this delta also has the counter 0, so the pose shows the restart. The next delta
     has the counter 1, and the driver counts no delta as lost.

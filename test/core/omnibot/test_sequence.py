@@ -84,7 +84,7 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
     """If a board sends no poses, only a low count after a pause makes the driver suspect a restart.
 
     A count is low if a restarted board would have lost at most as many deltas as a board that
-    continued. The driver is cautious, because only a pose could disprove a restart.
+    continued. Nothing can disprove a restart, because the board sends no poses.
     """
     sequence = begun(count)
     sequence.pause()

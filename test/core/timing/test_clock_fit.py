@@ -84,8 +84,8 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
     """A lower bound for the time of a tick is discarded if it contradicts the upper bounds.
 
-    An upper bound is always right, because each read comes after its tick. A lower bound is wrong
-    if the read was late.
+    An upper bound is always right, because each read comes after its tick. A late read can give a
+    wrong lower bound.
     """
     _, late_s = followed(
         0.0,
