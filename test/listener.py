@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Helpers for tests of a link: a listener in place of the node, and a session."""
+"""Helpers for tests of ``Link``, which connects a session to a port: a listener and a session.
+
+The listener takes the place of the driver's node.
+"""
 
 import threading
 from collections.abc import Callable, Sequence

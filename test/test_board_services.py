@@ -70,9 +70,10 @@ def test_a_driver_that_shuts_down_refuses_all_services_of_the_board(board: str) 
 @pytest.mark.parametrize("data", [True, False])
 @pytest.mark.parametrize("board", ["lois_ecu", "fejemis"])
 def test_a_replay_refuses_the_services_whose_effect_no_data_shows(board: str, data: bool) -> None:
-    """A replay writes nothing to a board. No service says that it has sent a command.
+    """In a replay, the services that command the board fail: a replay writes nothing to a board.
 
-    The records of the LOIS ECU are an exception: they wait for a record in the recording.
+    The test leaves out the services ``~/record_…`` of the LOIS ECU: in a replay, these services
+    wait until the recording contains such a record.
     """
     bench = nominal(board)
     services = Services(board, bench)

@@ -171,9 +171,9 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """The driver refuses a Twist with NaN or infinity in any of its six values.
+    """The driver rejects a Twist with NaN or infinity in any of its six values.
 
-    Axes along which the robot cannot move count, too.
+    This also applies to the axes along which the robot cannot move.
     """
     values = [0.1] * 6
     values[place] = nonsense

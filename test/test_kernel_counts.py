@@ -37,9 +37,9 @@ def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.Mo
 
 
 def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
-    """The waiting time of a thread is in s, if the kernel measures it.
+    """``waited_s`` returns how long a thread was ready to run but did not run, in s.
 
-    For an unknown thread, the waiting time is None.
+    The result is None if the thread does not exist, or if the kernel does not measure this time.
     """
     waited = waited_s(threading.get_native_id())
     assert waited is None or waited >= 0.0

@@ -228,10 +228,10 @@ def test_the_bag_of_a_killed_recorder_is_read_as_far_as_it_is_whole(
 
 
 def test_a_bag_that_breaks_off_before_its_first_message_says_so(tmp_path: Path) -> None:
-    """The bag of a killed recorder has no complete message. The error says that it is incomplete.
+    """The bag of a killed recorder has no complete message. The error calls the bag incomplete.
 
-    The error also advises to record the raw bytes. This alone would be misleading, because the bag
-    may have been recorded with them.
+    The error also advises the user to record the raw bytes. Without the word "incomplete", this
+    advice would mislead a user who has recorded the raw bytes.
     """
     file = bag(tmp_path / "bag", RX) / "bag.mcap"
     file.write_bytes(file.read_bytes()[:60])

@@ -65,7 +65,8 @@ def test_a_sender_of_refused_commands_does_not_pause(
 ) -> None:
     """The motion monitor has stopped the robot. Motion is refused until the sender is silent.
 
-    A sender of refused commands is not silent. So the driver also refuses its next valid command.
+    The sender goes on sending commands that the driver refuses or rejects, so the sender is not
+    silent. The driver also refuses the next valid command of this sender.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -100,9 +101,10 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 def test_a_refused_command_does_not_bring_back_a_refusal_that_has_ended(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A refused command does not bring back a refusal of motion that has already ended.
+    """The motion monitor stops the robot. The sender pauses, so motion is no longer refused.
 
-    The refusal after the motion monitor's stop ends when the sender pauses.
+    A command then arrives too late, and is refused. The next command is accepted, because the late
+    command does not renew the refusal of motion.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -39,7 +39,10 @@ def finished(coroutine: Any) -> Any:
 
 
 def test_a_gyro_bias_that_no_thread_can_save_is_answered(tmp_path: Path) -> None:
-    """The gyro's bias is measured. The answer says that it is applied, but not saved."""
+    """The gyro's bias is measured, but the computer cannot start a thread to save the bias.
+
+    The service fails. Its answer says that the bias is applied, but not saved.
+    """
     services, response = SimpleNamespace(_node=NODE), Trigger.Response(success=True, message="ok")
     finished(Services._save(services, tmp_path / "bias.yaml", [0.0, 0.0, 0.0], response))
     assert not response.success
@@ -47,7 +50,10 @@ def test_a_gyro_bias_that_no_thread_can_save_is_answered(tmp_path: Path) -> None
 
 
 def test_a_download_that_no_thread_can_save_is_answered() -> None:
-    """A file of a MART is downloaded. The answer says that it is not saved."""
+    """A file of a MART is downloaded, but the computer cannot start a thread to save the file.
+
+    The service fails. Its answer says that the file is not saved.
+    """
     services, done = SimpleNamespace(_node=NODE), SimpleNamespace(message="downloaded")
     answer = finished(MartTopics._save(services, done))
     assert answer == (False, f"downloaded; not saved: {NO_THREAD}")
@@ -71,7 +77,10 @@ def test_a_log_that_is_not_saved_is_to_be_copied_before_the_next_log_deletes_it(
 
 
 def test_a_record_that_no_thread_can_save_is_answered() -> None:
-    """A record of a LOIS ECU is received. The answer says that it could not be saved."""
+    """A LOIS ECU sends a record, but the computer cannot start a thread to save the record.
+
+    The service fails. Its answer says that the record could not be saved.
+    """
     answers: list[tuple[object, ...]] = []
     token = object()
     recorder = SimpleNamespace(

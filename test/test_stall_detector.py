@@ -70,9 +70,9 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """After several stalls, commands from before the end of the last stall are refused.
+    """A command may wait in the middleware during several stalls of the driver.
 
-    The middleware may deliver a command only after several stalls.
+    The driver refuses every command that was sent before the end of the last stall.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)

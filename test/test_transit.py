@@ -282,11 +282,11 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """The second message of a sender has two possible times of sending.
+    """The driver finds two possible times at which the second message of a sender was sent.
 
-    * One time is estimated from the arrival of the first message. The first message was 0.5 s
-      late, so this time is 0.5 s too late.
-    * The other time is that of the sender's clock. In this test, the sender's clock is right.
+    * The first time assumes that the sender's first message had no delay. In this test, the first
+      message was 0.5 s late, so this time is 0.5 s too late.
+    * The second time is by the sender's clock. In this test, the sender's clock is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -298,7 +298,8 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """The sender's clock is an hour behind. After ten messages, the driver knows this difference.
 
-    So the driver finds only one possible time of sending, which is right.
+    The driver no longer returns the time by the sender's clock as a possible time of sending. The
+    only possible time is by the driver's clock, and it is right.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

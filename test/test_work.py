@@ -92,7 +92,10 @@ def most_calls(
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 14), (DELTA, 9), (POSE, 9)])
 def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The decoder makes at most ``bound`` calls for a read with the bytes of one tick."""
+    """The decoder makes at most ``bound`` Python calls, on average, for the bytes of one tick.
+
+    The bound depends on the frames in the tick (``kind``).
+    """
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
@@ -115,7 +118,10 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """The session makes at most ``bound`` calls until it has an IMU reading from a tick's bytes."""
+    """The session makes at most ``bound`` Python calls, on average, to read a tick's IMU frame.
+
+    The bound depends on the frames in the tick (``kind``).
+    """
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
@@ -129,7 +135,10 @@ def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound
 
 
 def test_a_command_calls_no_more_than_it_did() -> None:
-    """A command needs few calls, from the bytes of a Twist to the packets for a running board."""
+    """The driver makes few Python calls from the bytes of a Twist to the packets for the board.
+
+    The test limits the number of these calls. The board is running.
+    """
     session, board, now = opened_session(), SimulatedBoard(BoardSettings(running=True)), 0.0
     for tick in range(SETTLED):
         now = tick * TICK_S

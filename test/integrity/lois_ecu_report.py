@@ -2,8 +2,9 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The *true* reports are those from the undamaged stream. A report from a damaged stream is wrong if
-it matches no true report in the same order. The simulated board shares no code with the driver.
+The *true* reports are those from the undamaged stream. Each report from a damaged stream is
+compared with the true reports after the last match; without a match, the report is wrong. The
+simulated board shares no code with the driver.
 """
 
 from collections import Counter

@@ -3,7 +3,7 @@
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
 In simulated trials, a damaged line carries the driver's bytes to a receiver, whose errors are
-counted. The exit code is 1 when a receiver misses a bound.
+counted. The exit code is 1 if the errors exceed a limit.
 
 ``--share``: run only this share of the trials, and write nothing.
 
@@ -37,7 +37,8 @@ BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 class Bound:
     """Limits of the errors that ``outbound_judge`` defines.
 
-    Stray motion and false letters are never allowed.
+    Two errors are never allowed: motion while the driver does not drive, and bytes of a frame that
+    the board takes for letters (S, P, R).
 
     ``share``: largest allowed share of the driving time in which an uncommanded set-point is
     active.

@@ -29,7 +29,7 @@ class Understood:
 
     * It begins or ends a motion.
     * The line is still sending an earlier write.
-    * The receiver does not understand exactly the control frames in the write.
+    * The receiver understands other commands than the control frames in the write.
     """
 
     held: list[bytes]
@@ -50,9 +50,10 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the course that results if the board shows another state from ``tick`` on.
+        """Return the driver's writes in this scene if the board reports ``shown`` from ``tick`` on.
 
-        ``shown``: the other state of the board.
+        ``shown``: the mode of the board, and whether the robot moves. Before ``tick``, the board's
+        states are those of this course.
         """
         other = self._others.get((tick, shown))
         if other is None:
@@ -68,7 +69,10 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """Number of runs of the session for this course and all courses that branch from it."""
+        """Total number of runs of the driver's session, with one run for each course.
+
+        The total includes this course, and all courses that ``when`` has derived from this course.
+        """
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

@@ -167,7 +167,11 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the active set-point, and count the time for which it was stray or uncommanded."""
+        """End the active set-point at ``at_s``. If the set-point is an error, count its duration.
+
+        An *uncommanded* set-point is in neither of the last two writes of the driver. A *stray*
+        set-point moves the robot while the driver does not drive.
+        """
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s

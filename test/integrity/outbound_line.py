@@ -16,9 +16,9 @@ CHANGED: Final = -2
 Arrival = tuple[int, float, int]
 """A byte that arrives: its value, its place, and its origin.
 
-The place is the byte's position in the write; an added byte is between two positions, such as 3.5.
-The origin of an undamaged byte is this position, too. Other bytes have the origin ``ADDED`` or
-``CHANGED``.
+The place is the byte's position in the driver's write. An added byte lies between two positions,
+so its place is a number such as 3.5. The origin of an undamaged byte is equal to its place. The
+origin of an added or changed byte is ``ADDED`` or ``CHANGED``.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 

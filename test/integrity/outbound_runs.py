@@ -25,9 +25,9 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. The commands differ from script to script."""
 NEEDED: Final = 10_000
-"""Least number of trials that end a drive, for each kind of receiver and rate of lost bytes.
+"""Minimum number of trials in which a drive ends, for each receiver and rate of lost bytes.
 
-The number is the sum over all scenes that end a drive. With 1 byte in 100 lost, each scene in
+Usually, all scenes in which a drive ends share these trials. With 1 byte in 100 lost, each scene in
 ``HURRIES`` alone has this number of trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")

@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-A running board reports motion in two cases: the driver sends motion commands, even if the line
-loses them, or the last received set-point is a motion. A change of state appears in the reports
-after one or two ticks.
+This simplified board reports motion in two cases: while the driver sends motion commands, whether
+or not they arrive, and while the last set-point that arrived is a motion. A change of state appears
+in the reports after one or two ticks.
 """
 
 import math
@@ -135,7 +135,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip a row of writes that arrive undamaged and change nothing, but not its last write.
+        """Skip a series of writes that arrive undamaged and change nothing, except the last write.
 
         The skipped writes count as arrived. The last write goes over the line as usual.
         """

@@ -55,7 +55,7 @@ class Outcome:
     happened: Counter[str] = field(default_factory=Counter)
 
     def add(self, other: "Outcome") -> None:
-        """Add the counts of another robot."""
+        """Add the results of another robot's drive to this result."""
         self.seconds += other.seconds
         self.trips += other.trips
         self.said += other.said
@@ -129,7 +129,10 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """Count the notices of the session. Deliver the driver's writes after the line's delay."""
+        """Count the session's notices, and carry the session's bytes over the line to the board.
+
+        Each byte reaches the board after the delay of the simulated line.
+        """
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)

@@ -22,9 +22,9 @@ Few seeds have this effect in a stream as short as this one.
 
 @pytest.fixture(scope="module")
 def scores() -> Scores:
-    """Return the scores of every scenario, fault and chunking.
+    """Return the counts of right and wrong frames for every scenario, fault and chunking.
 
-    Each limit is tested with about 2,100 frames.
+    For each fault and chunking, the scenarios together have about 2,100 frames.
     """
     total: Scores = {}
     for scenario in SCENARIOS:

@@ -81,10 +81,10 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 
 
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
-    """Return about one in ``number`` of all combinations of one choice from each list.
+    """Return a part of all combinations of choices: about one combination in ``number``.
 
-    With three or more lists, each of at least ``number`` choices, the result has every pair of
-    choices from any two lists.
+    A combination has one choice from each list. If there are three or more lists, and each list has
+    at least ``number`` choices, then any two choices from different lists occur together.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [
@@ -164,9 +164,9 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most reads use the decoder's shortcut for single IMU frames.
+    """More than half of the reads of a stream use the decoder's shortcut for single IMU frames.
 
-    Otherwise, the other tests would not test this shortcut.
+    With only a few such reads, the other tests of this file would not check this shortcut.
     """
     fed = []
     feed = FrameDecoder.feed
@@ -222,7 +222,10 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder restores its state after any frame by evaluating at most 6 frames again."""
+    """The decoder finds what it knew after any earlier frame, by evaluating at most 6 frames again.
+
+    The result is the same as after an evaluation of all frames from the first one.
+    """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]

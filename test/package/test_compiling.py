@@ -2,8 +2,9 @@
 
 """Tests of an installation with ``OMNIBOT_DRIVER_COMPILE=1``, which compiles a part of the core.
 
-mypyc and the C compiler take a minute. So in these tests, either a substitute for mypyc
-makes one small C module, or a substitute for the C compiler does nothing.
+mypyc and the C compiler take a minute, so each test replaces one of them. Most tests replace mypyc
+by code that writes one small C module. One test runs mypyc, and replaces the C compiler by a
+program that does nothing.
 """
 
 import os

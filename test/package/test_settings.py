@@ -97,7 +97,10 @@ def test_ros_reads_each_parameter_file(path: Path) -> None:
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_yaml_reads_the_defaults_in_each_parameter_file(board: str) -> None:
-    """Python's YAML parser reads each default with its type: 1e-06 would become a string."""
+    """Python's YAML parser reads each default in a parameter file with the right type.
+
+    A file must not have a number such as 1e-06: this parser reads it as a string.
+    """
     rows = boards.load(board).PARAMETERS.by_name
     values = load(f"{board}.yaml")["/**"]["ros__parameters"]
     assert values == {name: rows[name].default for name in values}
@@ -166,8 +169,8 @@ def test_nav2_uses_the_drivers_topics_and_frames() -> None:
 def test_nav2_has_the_behaviours_of_its_default_trees(path: Path) -> None:
     """Nav2's default behaviour trees use three behaviours, so the behaviour server has all of them.
 
-    Bug: the file for a Fejemis had no backup. Then bt_navigator does not load its tree, and Nav2
-    does not start.
+    Bug: the file for a Fejemis lacked the behaviour ``backup``, so bt_navigator could not load its
+    tree, and Nav2 did not start.
     """
     server = load(path.name)["behavior_server"]["ros__parameters"]
     assert {"spin", "wait", "backup"} <= set(server["behavior_plugins"])
@@ -212,9 +215,10 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
 
 @pytest.mark.parametrize("namespace", ["/", "/robot1"])
 def test_the_mux_reads_its_file_in_each_namespace(namespace: str) -> None:
-    """The file is for twist_mux in any namespace, because each robot has one in its own.
+    """The parameter file for twist_mux has an effect in any namespace.
 
-    Bug: in a namespace, twist_mux had no parameters, so it forwarded no command.
+    Each robot of a fleet has its own namespace, in which its twist_mux runs. Bug: in a namespace,
+    twist_mux got no parameters, so it forwarded no command.
     """
     context = Context()
     arguments = ["--params-file", str(CONFIG / "twist_mux.yaml"), "-r", f"__ns:={namespace}"]

@@ -63,9 +63,9 @@ class Hits:
 
 @dataclass
 class Solid:
-    """A box, or a cylinder about its own z axis that fits exactly into a box.
+    """A box, or the cylinder about the box's own z axis that fits exactly into the box.
 
-    ``half``: half the lengths of the sides of that box.
+    ``half``: half the lengths of the box's sides. ``is_round``: whether the solid is the cylinder.
     """
 
     matrix: Array

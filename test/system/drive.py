@@ -38,11 +38,12 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Result of a drive.
+    """Result of a drive: the driver's messages, compared with the frames of the board.
 
-    ``imu_sent``, ``odom_sent``: frames sent, counted from the first that the driver published.
+    ``imu_sent``, ``odom_sent``: number of frames that the board sent, counted from the first frame
+    that the driver published.
 
-    ``imu_wrong``, ``odom_wrong``: messages that match no frame.
+    ``imu_wrong``, ``odom_wrong``: number of messages that match no frame.
 
     ``worst_m``, ``worst_rad``: largest difference between ``odom`` and the pose of the board.
 

@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import NoReturn
 
 LARGEST_REQUEST = 1 << 17
-"""Largest size of a request, in bytes.
+"""Maximum size, in bytes, of a request to the nursery. The end of a larger request is lost.
 
-A request contains the arguments and the environment of a driver, and Python code. The forked
-process runs this code before the driver.
+A request makes the nursery fork a process for a driver. The request contains the driver's arguments
+and environment, and Python code that this process runs before the driver.
 """
 
 

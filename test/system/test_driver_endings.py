@@ -133,9 +133,10 @@ node.OmniBotDriver._on_estop_topic = hold
 join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 20 * timeout)
 """
-"""Code with a callback that blocks the executor until the driver has asked the executor to end.
+"""Code for the driver's process: a callback blocks the executor until the driver ends.
 
-The driver's threads also get more time to end.
+The callback returns when the driver has asked the executor to end. The code also makes the driver
+wait 20 times longer than usual for its threads to end.
 """
 
 

@@ -167,7 +167,8 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 ) -> None:
     """The computer is suspended while the robot drives. Afterwards, the driver stops the robot.
 
-    The command timeout is not the cause, because its clock does not count the suspension.
+    The driver stops the robot because it detects a stall. The command timeout would not stop the
+    robot, because the clock of this timeout does not count the suspension.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(

@@ -192,7 +192,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
 def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
     """The driver's port is a TCP server that closes each connection at once.
 
-    The driver connects again and again, but reports only once that the port is open.
+    The driver connects again and again, but logs only one message that the port is open.
     """
     server = socket.create_server(("127.0.0.1", 0))
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"

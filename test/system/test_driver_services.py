@@ -86,7 +86,11 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """A message true on the topic ``estop`` latches the e-stop, even if false follows 50 times."""
+    """While the driver is suspended, the topic ``estop`` gets ``true``, then ``false`` 50 times.
+
+    When the driver runs again, ``true`` latches the e-stop. The messages ``false`` on this topic do
+    not release the e-stop.
+    """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
     driver.process.send_signal(signal.SIGSTOP)

@@ -141,9 +141,9 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_the_space_bar_works_after_a_byte_that_is_no_key(
     driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """Bytes that are not UTF-8 arrive from the keyboard, before the space bar and with it.
+    """The keyboard sends bytes that are not UTF-8, first alone, then together with the space bar.
 
-    The monitor ignores them, and the e-stop is latched.
+    The monitor ignores these bytes, and the space bar latches the e-stop.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

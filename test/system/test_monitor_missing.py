@@ -46,9 +46,9 @@ def measure(fake: Probe, odometry: Odometry) -> None:
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
-    """Without ``~/estop``, the monitor sends the e-stop on the topic ``estop``.
+    """The driver has no service ``~/estop``, so the monitor sends ``true`` on the topic ``estop``.
 
-    The message is repeated until the driver reports a latched e-stop.
+    The monitor repeats this message until the driver reports a latched e-stop.
     """
     said = fake.listen(Bool, "estop")
     feed = Feed([], "fake", "omnibot_driver")

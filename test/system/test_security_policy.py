@@ -157,10 +157,12 @@ def test_operators_and_observers_may_read_all_commands(file: str) -> None:
 def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> None:
     """A node of each enclave may offer the services that every rclpy node has.
 
-    The node must have the name in its enclave's profile. Only the operator's tools may have any
-    name. So no enclave except the operator's may answer in the driver's name.
+    The node must have the name in its enclave's profile. The operator's tools are the only nodes
+    that may choose their names freely. So no enclave except those of the driver and the operator
+    may answer in the driver's name.
 
-    Bug: under SROS2, no node of these enclaves could start: the policy allowed it no services.
+    Bug: under SROS2, no node of these enclaves could start, because the policy allowed the nodes no
+    services.
     """
     for path, profile in profiles(POLICY.with_name(f"{file}.policy.xml")).items():
         name = "monitor_1" if path == "/omnibot/operator" else profile.attrib["node"]

@@ -216,7 +216,10 @@ def _as_read(data: bytes, chunks: Chunks) -> Iterator[tuple[bytes, float]]:
 def _reads(
     data: bytes, chunks: Chunks, random: Random, stalls_at: float, stall_s: float
 ) -> Iterator[tuple[bytes, float]]:
-    """Yield the reads of a host. It reads each chunk a little late, and once it stalls."""
+    """Yield the bytes and the time of each read of a host, which reads each chunk a little late.
+
+    At the time ``stalls_at``, the host stalls for ``stall_s``. Both times are in s.
+    """
     at, now = 0, 0.0
     for number, (end, time) in enumerate(chunks):
         now = max(now + READ_S, time + random.expovariate(1.0 / JITTER_S))

@@ -67,9 +67,10 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
 
 
 def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
-    """Stamp ``seeds`` streams of ``seconds`` for each case. Return the results by case.
+    """Stamp several streams for each case, and return the results by case.
 
-    The streams are generated and stamped on all processors at the same time.
+    ``seeds``: number of streams for each case. ``seconds``: length of each stream. The streams are
+    generated and stamped on all processors at the same time.
     """
     jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
     found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
@@ -83,9 +84,9 @@ def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[F
 
 
 def publish(name: str, lines: list[str]) -> None:
-    """Print the lines, and write them into the document.
+    """Print the lines, and write them into docs/internals/time.md.
 
-    There, they replace the text between the two marks that contain ``name``.
+    The lines replace the text between the two comments in this document that contain ``name``.
     """
     text = "\n".join(lines)
     print(text)
@@ -95,7 +96,11 @@ def publish(name: str, lines: list[str]) -> None:
 
 
 def lines_and_events(seconds: float, seeds: int) -> None:
-    """Measure the stamps on each line, without and with events. The host reads promptly."""
+    """Measure the stamps on each kind of line, without an event and with each kind of event.
+
+    An event is a restart of the board or a stall of the host. Between events, the host reads
+    promptly. The results are written into the document.
+    """
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]
     cells += [

@@ -5,9 +5,10 @@
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Number of control ticks before the answer by which the user judges a motion.
+"""Number of control ticks that the user looks at before answering how the wheels turned.
 
-These ticks contain the end of the motion, and the standstill after it.
+These are the last ticks before the answer. They contain the end of the motion, and the standstill
+after it.
 """
 
 

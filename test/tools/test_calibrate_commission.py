@@ -42,10 +42,10 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The tool finds reversed axes, another delta frame and a turned IMU.
+    """The tool finds that a robot has reversed axes, a turned IMU, and deltas in the body's axes.
 
     The user's first answer is impossible, and the tool says so. A driver can load the calibration
-    file.
+    file that the tool writes.
     """
     with rig(
         tmp_path,

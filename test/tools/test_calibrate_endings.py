@@ -138,9 +138,9 @@ def test_a_full_disk_for_the_output_loses_nothing(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The output goes to a disk that is full.
+    """The program's standard output goes to a full disk, but the calibration file is still saved.
 
-    The result is still saved, and one sentence says why the program ends.
+    One sentence on stderr says why the program ends.
     """
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         monkeypatch.setattr(sys, "stdout", full)

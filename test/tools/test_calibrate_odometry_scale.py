@@ -118,7 +118,8 @@ class Encoder(TwoWheels):
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
     """The tool finds ``metres_per_count`` and ``linear_scale`` from two straight drives.
 
-    The user measures no turns: the driver of this robot has no parameter that a turn could correct.
+    The user measures no turns: the robot's driver takes the heading from a gyro, and has no scale
+    for turns.
     """
     robot = Encoder()
     console = Console(

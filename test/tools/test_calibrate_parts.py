@@ -50,7 +50,10 @@ def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
 
 
 def test_a_front_wheel_may_turn_before_the_robot_moves() -> None:
-    """A robot with a steered front wheel stands for 1.3 s, until the wheel has turned sideways."""
+    """A robot is commanded to turn, but stands for 1.3 s while its front wheel turns sideways.
+
+    The tool accepts this delay without an error, because the front wheel is steered.
+    """
     obedience = Obedience("cmd_vel", boards.load("fejemis").PARAMETERS.by_name)
     still, turning = (0.0, 0.0, 0.0), (0.0, 0.0, 0.5)
     for tick in range(350):
@@ -83,9 +86,10 @@ def test_a_command_changes_no_faster_than_allowed(
     "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
-    """A command above a bound or with NaN is refused.
+    """The tool rejects a command that exceeds the limits of the calibration, or contains NaN.
 
-    The bound limits the length of the vector (x, y).
+    On ``cmd_vel``, the speed limit applies to the length of the vector (x, y). On ``wheel_cmd``, it
+    applies to each wheel rate.
     """
     with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
         BOUNDS.require_allowed("cmd_vel", command)

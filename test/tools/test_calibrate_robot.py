@@ -286,9 +286,9 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a robot does not come to rest after Stop, the error advises to cut the robot's power.
+    """If a robot does not come to rest after Stop, the error advises the user to cut its power.
 
-    An error that has ended the motion also contains this advice.
+    If another error has ended the motion, its message also contains this advice.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)

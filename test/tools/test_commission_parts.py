@@ -257,7 +257,10 @@ def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
 
 
 def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
-    """Return a drift with this mean velocity. Both halves of its time span have the same speed."""
+    """Return the measured motion (``Drift``) of a robot that moves at this constant velocity.
+
+    ``vx`` and ``vy`` are in m/s, ``yaw_rate`` in rad/s.
+    """
     return Drift(vx, vy, yaw_rate, math.hypot(vx, vy), math.hypot(vx, vy))
 
 
@@ -281,9 +284,10 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """The tool finds positional control if a doubled command makes the robot no faster.
+    """The tool finds positional control if a doubled command does not make the robot faster.
 
-    It also finds positional control if the robot stops at a goal.
+    The tool also finds positional control if the robot stops at a goal. In both cases, the board
+    takes commands as positions.
     """
     assert control_method(slow, fast, 0.06) == "position"
 

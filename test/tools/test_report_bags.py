@@ -230,7 +230,10 @@ def test_a_full_disk_for_the_output_is_told_in_one_sentence(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The output goes to a disk that is full. The message says where the report is."""
+    """The program's standard output goes to a full disk, but the report is already written.
+
+    One line on stderr says that the output cannot be written, and where the report is.
+    """
     bag = write(tmp_path / "bag", [drive])
     with Path("/dev/full").open("w", encoding="utf-8") as full:
         monkeypatch.setattr(sys, "stdout", full)

@@ -14,7 +14,10 @@ from omnibot_driver.tools.report.judge import judge
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """Timestamps that jump ahead and slowly become right are reported as a jump, not as a gap."""
+    """The IMU's timestamps jump ahead by 20 ms, and return to the right times within 50 samples.
+
+    The report calls this a jump, not a gap.
+    """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
     (leap,) = troubles(drive)

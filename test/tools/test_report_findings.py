@@ -231,15 +231,19 @@ MART = {"Odometry rate (Hz)": "4.9 of 5", "Published odometry (Hz)": "20"}
 
 
 def beside(drive: Drive, *streams: dict[str, str]) -> Log:
-    """Return the log of ``drive`` among several robots, with these diagnostics of all of them."""
+    """Return the log of ``drive``, recorded while other robots published too.
+
+    ``streams``: for each robot, the values of its diagnostics "Stream".
+    """
     drive.statuses[:] = [(1.5, "omnibot_driver: Stream", 0, "complete", one) for one in streams]
     return replace(drive.log(), alone=False)
 
 
 def test_the_rate_of_another_robot_is_not_expected(drive: Drive) -> None:
-    """A recording of an OmniBot and a MART does not show which rate each odometry should have.
+    """A bag has an OmniBot and a MART, and does not show which rate ``odom`` should have.
 
-    The rate of the IMU can only belong to the robot with an IMU.
+    The report gives the rate of ``odom`` only in a note. Only the OmniBot has an IMU, so the report
+    expects the 100 Hz of the OmniBot's IMU.
     """
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.odom, name, getattr(drive.odom, name)[::2])

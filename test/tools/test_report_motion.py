@@ -204,7 +204,10 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 
 
 def test_a_front_wheel_may_turn_before_the_robot_moves(drive: Drive) -> None:
-    """A Fejemis stands for 2 s, because its front wheel first turns from one side to the other."""
+    """A Fejemis stands for 2 s, because its front wheel first turns from one side to the other.
+
+    The report does not say that the robot stood still although it was commanded to move.
+    """
     rows = (drive.odom.stamp_s > 12.0) & (drive.odom.stamp_s < 14.0)
     drive.odom.values[rows, 3:] = 0.0
     assert not any("stood still" in finding.text for finding in judge(of_a_fejemis(drive)))

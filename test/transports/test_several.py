@@ -180,9 +180,9 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The driver does not share a full line with the guard.
+    """The driver does not share a line with the guard if the line accepts no more data.
 
-    The guard would keep the port locked, so the driver could not open it again.
+    The guard would keep the port locked, so the driver could not open the port again.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -260,9 +260,11 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 def test_of_two_drivers_that_wait_for_the_same_lines_one_gets_both(
     ours: tuple[int, int], theirs: tuple[int, int], ends: Ends, tmp_path: Path
 ) -> None:
-    """Two drivers wait for the same two lines, in any order, and each driver has one of the lines.
+    """Two drivers wait for the same two lines, and each driver has opened one of the lines.
 
-    The driver without the leading line gives up, so the other driver gets both lines.
+    The *leading* line is the one whose device has the first path in alphabetical order. The driver
+    without this line gives up, so the other driver gets both lines. The order in which the drivers
+    name the lines does not matter.
     """
     leading, other = sorted(ends.paths, key=os.path.realpath)
     late = tmp_path / "late"

@@ -167,7 +167,10 @@ def test_a_host_that_may_appear_later_is_not_refused(host: str) -> None:
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
-    """The error about a lost host has the IPv6 address in brackets, and the port of the channel."""
+    """The error about a lost host contains the host's IPv6 address in brackets, as in a URL.
+
+    The port in the error is that of the channel to which the driver was writing.
+    """
     lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
     with contextlib.closing(UdpPorts("udp://[::1]:5000", 2)) as transport, lost:
         transport.write(((1, bytes(100_000)),))
@@ -205,7 +208,10 @@ class Names:
         return [each for ip in self.addresses for each in self._real(ip, *more, **options)]
 
     def wait_for(self, lookups: int, transport: UdpPorts) -> None:
-        """Read until ``lookups`` more lookups of the name have begun. No data must arrive."""
+        """Read until ``lookups`` more lookups of the name have begun.
+
+        Fail if a read returns data.
+        """
         end = time.monotonic() + PATIENCE_S
         while lookups:
             assert transport.read() == (0, b"")
@@ -256,7 +262,10 @@ def test_a_silent_host_with_another_address_is_lost(names: Names, named: UdpPort
 def test_a_silent_host_that_may_have_the_same_address_is_not_lost(
     addresses: list[str], names: Names, named: UdpPorts
 ) -> None:
-    """A silent host is not lost if its name is unknown, or still has the address in use."""
+    """A host is silent. A lookup of its name fails, or still finds the address in use.
+
+    The driver does not report that the host is lost.
+    """
     names.addresses = addresses
     names.wait_for(5, named)
 

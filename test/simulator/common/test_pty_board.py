@@ -173,7 +173,7 @@ def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
 
 
 def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
-    """A link that a killed simulator left behind is replaced at the next start."""
+    """A simulator replaces the symbolic link that a killed simulator has left behind."""
     link = tmp_path / "board"
     link.symlink_to("/dev/pts/no-such-terminal")
     with PtyBoard(Ticker(), str(link)) as pty:
@@ -181,7 +181,10 @@ def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
-    """A simulator does not remove its link after another simulator has replaced the link."""
+    """A second simulator replaces the symbolic link of the first simulator.
+
+    When the first simulator ends, the link of the second simulator is not removed.
+    """
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)):
         second = PtyBoard(Ticker(), str(link))

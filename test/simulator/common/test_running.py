@@ -40,7 +40,10 @@ class Motor:
 
 
 class LateBoard(RunningBoard[Motor]):
-    """A board whose thread is delayed by a busy computer. A stop arrives during the delay."""
+    """A simulated board whose thread runs late, as on a busy computer.
+
+    During the delay, the board gets the command "stop".
+    """
 
     def __init__(self) -> None:
         super().__init__(Motor())

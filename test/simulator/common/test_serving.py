@@ -68,7 +68,7 @@ def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> N
 
 
 def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
-    """A user gives as many links as the board has terminals.
+    """A user gives the simulator one symbolic link for each terminal of the board.
 
     The first link leads to the first terminal, and the second link to the second terminal.
     """
@@ -189,7 +189,11 @@ def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
 
 
 def test_the_facts_add_what_became_of_the_lines() -> None:
-    """The ``facts`` of a running board include how many data were dropped, lost and duplicated."""
+    """The ``facts`` of a running board have the counts of dropped, lost and duplicated data.
+
+    ``dropped`` counts bytes that the simulator could not send. ``lost`` and ``duplicated`` count
+    datagrams that the simulated network has lost and duplicated.
+    """
     with ServedBoard(ToyServer()) as served, served.lock:
         assert served.facts == {
             "x_m": 0.0,

@@ -97,9 +97,10 @@ def test_no_command_ends_by_itself() -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
-    """The firmware mirrors reverse drives: it steers as for the same curve in forward direction.
+    """A robot is commanded to drive a curve in reverse, and turns in the commanded direction.
 
-    The robot drives a curve in reverse, and turns as commanded.
+    The firmware ("mirrored") gives the front wheel the same angle as for driving forward on the
+    same curve.
     """
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)

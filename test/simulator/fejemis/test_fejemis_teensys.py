@@ -137,9 +137,10 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """While one half is silent, hung or unplugged, the other sends, and the robot drives on.
+    """While one half is silent, hung or unplugged, the other half sends, and the robot drives on.
 
-    Only a silent half still obeys commands.
+    A half that is only silent still obeys commands. A hung or unplugged half does not. When the
+    fault ends, the half sends again.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
@@ -235,9 +236,10 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """A frozen angle sensor repeats its angle.
+    """The front board reports a frozen, an absent and a faulty angle sensor in different ways.
 
-    The diagnosis shows an absent sensor. An error flag shows a sensor that reports an error.
+    With a frozen sensor, the angle stays the same while the wheel turns. With an absent sensor, the
+    angle is 0, and the diagnosis changes. With a sensor in error, an error flag is set.
     """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")

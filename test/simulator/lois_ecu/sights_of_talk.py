@@ -171,7 +171,10 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """Return whether the board ignores a ball request less than 6 s after the previous ball."""
+    """Return whether the board ignores a request for a ball within 6 s after the previous ball.
+
+    The board's ball distribution device drops one ball for each request.
+    """
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())

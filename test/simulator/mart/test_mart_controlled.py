@@ -86,7 +86,7 @@ def test_a_negative_distance_is_refused() -> None:
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     """A move with the distance zero, or a word as distance, has no limit on the public server.
 
-    Without the quirk ``zero_distance_is_unlimited``, the server refuses the move.
+    Without the quirk ``zero_distance_is_unlimited``, the server rejects the move.
     """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
@@ -106,7 +106,7 @@ def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     ],
 )
 def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
-    """The server refuses a command that has no distance or angle.
+    """The server rejects a command in which the distance or the angle is missing.
 
     Its reply says "missing parameter", but "missing" is misspelt in the replies to TF and TB.
     """

@@ -25,9 +25,10 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether a drive (F) stopped by SL on the stop port still counts as in progress.
+    """Return whether the server regards a drive (F) as in progress after SL has stopped the robot.
 
-    If so, the server refuses other motions, and the stop SM hangs the command port.
+    SL is a stop on the stop port. If the drive counts as in progress, the server refuses other
+    motions. A later stop with SM then makes the command port hang.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -95,9 +96,10 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether a forward drive (RM) fails if it directly follows a stop that took 0.57 s.
+    """Return whether a forward drive (RM) fails if the robot has just taken 0.57 s to stop.
 
-    If this RM fails, the function checks that a second RM succeeds.
+    Cause: the RM continues the sample count of the stop (SRM) instead of counting from 0. If this
+    RM fails, the function checks that a second RM succeeds.
     """
     rig = Rig(quirks)
     rig.drive("RM 66")

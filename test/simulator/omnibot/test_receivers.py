@@ -192,7 +192,11 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """A window receiver finds a second frame within a frame whose first word is -2 (FF FE)."""
+    """A receiver of the kind ``window`` finds two frames that overlap.
+
+    The first word of the first frame is -2 (FF FE), which is also the header of the second frame. A
+    receiver of the default kind finds only the first frame.
+    """
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
     assert understood(data, kind=WINDOW) == [first, second]

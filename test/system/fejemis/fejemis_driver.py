@@ -29,9 +29,9 @@ def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Drive
 
 @contextmanager
 def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command a velocity at 10 Hz until the context ends. The context begins when the robot moves.
+    """Command a velocity at 10 Hz, wait until the robot moves, then run the caller's block.
 
-    ``vx`` is in m/s, and ``yaw`` in rad/s.
+    The commands continue until the block ends. ``vx`` is in m/s, and ``yaw`` in rad/s.
     """
     with probe.commanding(vx, yaw):
         robot.wait_until(lambda board: not board.standing)

@@ -149,8 +149,8 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """``~/reset`` sets the board's tick counts to 0, but the pose in odom continues.
 
-    When the wheels start, a report may make the pose in odom jump by 0.15 m, because the board
-    reports its tick counts only every 400 ms.
+    When the robot drives again, no step of the pose is as large as 0.25 m. Steps of up to 0.15 m
+    are normal, because the board reports its tick counts only every 400 ms.
     """
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for(lambda: odometry)

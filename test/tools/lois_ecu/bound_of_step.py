@@ -7,8 +7,8 @@ Run this by hand:
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
 The robots are random, as in ``judge_step.py``. A *mark* is a place on the encoder's disc at which
-the board counts a tick. The load and the rate change by 0.5 % between records. The kinds of noise
-are:
+the board counts a tick. The load varies between records, which changes the final speed of the wheel
+by 0.5 %. The kinds of noise are:
 
 - "each time": every time between ticks has an independent error of 10 %.
 - "other marks": the marks are displaced by 10 %, differently in each turn.
@@ -69,7 +69,10 @@ def _slope(values: Column, place: int | slice) -> Column:
 
 
 def _covariance(kind: str, ways_s: Column) -> Column:
-    """Return the covariance of the relative errors of the times between marks."""
+    """Return the covariance of the relative errors of the times between the encoder's marks.
+
+    ``kind``: the kind of noise. ``ways_s``: the times between the marks, in s.
+    """
     count = len(ways_s)
     if kind == "each time":
         return NOISE**2 * np.eye(count)
@@ -80,7 +83,11 @@ def _covariance(kind: str, ways_s: Column) -> Column:
 
 
 def main(robots: int = 20) -> None:
-    """Print the median and the greatest bound over the robots for each kind of noise."""
+    """Print how exactly any fit could find the fast time constant, for each kind of noise.
+
+    The printed bound is a relative standard deviation: the median and the greatest value of
+    ``robots`` random robots.
+    """
     for kind in ("each time", "other marks", "same marks"):
         found = []
         for seed in range(robots):

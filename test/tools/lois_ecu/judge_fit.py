@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Judge the fit and the tuning of wheels on random robots with unknown motors.
+"""Judge how well the tool finds and tunes the unknown motors of random robots.
 
-Run this by hand, with the number of robots and optionally the first seed (10 s for each wheel):
+Run this by hand. The arguments are the number of robots and, optionally, the seed of the first
+robot. Each wheel takes 10 s:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_fit.py 20
 

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot with a LOIS ECU in simulated time. It replaces a running driver."""
+"""A simulated robot with a LOIS ECU, which tests of ``calibrate`` use instead of a driver.
+
+The robot runs in simulated time.
+"""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

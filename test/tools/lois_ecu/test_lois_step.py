@@ -51,9 +51,10 @@ def tuned() -> Tuned:
 
 
 def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Column]:
-    """Return simulated records of starts at full duty.
+    """Return simulated records of a wheel that starts at full duty.
 
-    A record has the times in s between the encoder's marks, which are misplaced.
+    A record has the times in s between the marks of the wheel's encoder. The simulated marks are
+    displaced at random.
     """
     random = np.random.default_rng(seed)
     times_s = np.arange(0.0, 6.0, 1e-4)
@@ -227,7 +228,10 @@ def test_a_phase_margin_is_that_of_the_open_loop() -> None:
 
 
 def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
-    """The fit finds a dead time of 40 ms in the response to a step, within 11 ms."""
+    """A wheel's response to a step has a dead time of 40 ms.
+
+    The fit finds this dead time with an error of at most 11 ms.
+    """
     gains = tuned().gains
     dead_s = 0.04
     rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0, begun=0.6)
