@@ -73,7 +73,7 @@ def test_a_replay_refuses_the_services_whose_effect_no_data_shows(board: str, da
     """In a replay, the services that command the board fail: a replay writes nothing to a board.
 
     The test leaves out the services ``~/record_…`` of the LOIS ECU: in a replay, these services
-    wait until the recording contains such a record.
+    wait until the replay comes to a record that the board sent.
     """
     bench = nominal(board)
     services = Services(board, bench)

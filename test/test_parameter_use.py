@@ -104,7 +104,7 @@ def test_the_settings_have_the_defaults_of_the_parameters(board: str) -> None:
     """A board's function ``settings`` makes the default settings from the default parameters.
 
     An exchange of two fields with different defaults in this function would change the result. The
-    defaults of the fields in ``UNLIKE_THE_ROW`` differ on purpose.
+    fields in ``UNLIKE_THE_ROW`` are exceptions: their defaults differ.
     """
     settings = boards.load(board).settings(boards.check_all({"board": board}))
     defaults = type(settings)()

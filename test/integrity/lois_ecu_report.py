@@ -3,8 +3,8 @@
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
 The *true* reports are those from the undamaged stream. Each report from a damaged stream is
-compared with the true reports after the last match; without a match, the report is wrong. The
-simulated board shares no code with the driver.
+compared with the true reports that follow the last match. A report that is equal to none of these
+is wrong. The simulated board shares no code with the driver.
 """
 
 from collections import Counter

@@ -215,7 +215,7 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
 
 @pytest.mark.parametrize("namespace", ["/", "/robot1"])
 def test_the_mux_reads_its_file_in_each_namespace(namespace: str) -> None:
-    """The parameter file for twist_mux has an effect in any namespace.
+    """The parameter file for twist_mux applies in any namespace.
 
     Each robot of a fleet has its own namespace, in which its twist_mux runs. Bug: in a namespace,
     twist_mux got no parameters, so it forwarded no command.

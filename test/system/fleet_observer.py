@@ -3,8 +3,8 @@
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
 Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. Tests run this program
-as a process of its own. If the tests' process became a client of a discovery server, this process
-could no longer find nodes that use no server (Fast DDS).
+as a process of its own: with Fast DDS, a process that becomes a client of a discovery server can no
+longer find nodes that use no server.
 """
 
 import sys

@@ -288,7 +288,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 ) -> None:
     """If a robot does not come to rest after Stop, the error advises the user to cut its power.
 
-    If another error has ended the motion, its message also contains this advice.
+    If another error has ended the motion before, the message of that error also has this advice.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)

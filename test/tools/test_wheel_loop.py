@@ -157,7 +157,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 
     Two errors are compared with those of the manual's gains: the error after a change of the load,
     and the error after a command. The error after a load change is smaller. The error after a
-    command may be larger, but the ratios of new to old error add up to less than 2.
+    command may be larger, but the sum of the two ratios of new to old error is less than 2.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
