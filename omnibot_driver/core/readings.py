@@ -192,13 +192,13 @@ Reading = (
 class SampleBoundary:
     """Place in the stream of IMU samples at which a read of the port ended.
 
-    * ``ahead``: 1 if a sample has arrived, at least its first part, and was not returned as an
+    * ``ahead``: 1 if the last sample, or its first part, has arrived but was not returned as an
       ImuReading yet; else 0.
     * ``cut``: whether the end of this sample is missing. Such a sample is called a cut sample.
     * ``latest_s``: latest time at which the cut sample can be complete, in s after the read. It is
       0 without a cut sample.
     * ``earliest_s``: earliest time at which the cut sample can be complete, in s after the read.
-      Without a cut sample, this is the time for the next sample.
+      Without a cut sample, it is the earliest time at which the next sample can be complete.
     """
 
     ahead: int

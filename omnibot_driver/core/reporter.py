@@ -85,7 +85,7 @@ class Reporter:
         )
 
     def notify(self, sentences: Sequence[str]) -> None:
-        """Add one notice to the events for each sentence."""
+        """Append each sentence to the events, as a notice to the user."""
         if sentences:
             self.events += map(Notice, sentences)
 

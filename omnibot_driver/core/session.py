@@ -2,10 +2,11 @@
 
 """A session with one board: it takes bytes and commands, and gives measurements and packets.
 
-After each input, the caller writes ``take_output`` and handles ``take_events``. It calls ``tick``
-at ``wake_at``. Not thread-safe; reads no clock.
+After each input, the caller writes ``take_output`` and handles ``take_events``. The caller calls
+``tick`` at ``wake_at``. The session is not thread-safe, and reads no clock.
 
-This module connects the parts of a session. It does not know bytes or threads.
+This module connects the parts of a session. It does not know what the bytes mean, or which threads
+exist.
 """
 
 import math
@@ -95,7 +96,7 @@ class Session:
 
     @property
     def refused(self) -> Refused:
-        """Counts of the readings rejected as implausible."""
+        """Numbers of readings that were rejected as implausible since the driver began."""
         return self._measurement.refused
 
     def figures(self, now: float) -> SessionFigures:
@@ -133,7 +134,8 @@ class Session:
         If a limit or timeout becomes stricter, the robot is stopped, except while it drives to a
         goal. If the scale of the odometry changes, the current goal is dropped.
 
-        ``board``: new settings of the board itself. The current command is then encoded again.
+        ``board``: new settings of the board itself; None if they stay the same. The current command
+        is encoded again with the new settings of the board. If this fails, the robot is stopped.
         """
         self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:

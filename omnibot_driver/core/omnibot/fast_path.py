@@ -53,13 +53,15 @@ IMU. More frames would add little."""
 
 
 class Walk:
-    """Consecutive frames at the start of the held bytes. No evidence speaks against these frames.
+    """Consecutive frames at the start of the bytes that the decoder holds.
+
+    No evidence speaks against these frames.
 
     * ``ends``: the position in the bytes after each frame.
     * ``lessons``: IMU frames from which the usual scatter is learned. Each entry: number of frames
       before the IMU frame, the IMU frame itself, and the previous IMU frame.
-    * ``known``: what was known before some of the frames. Each entry: number of frames before this
-      point, and the fields of ``Context`` at this point.
+    * ``known``: what the decoder knows from earlier frames, at some places in the row of frames.
+      Each entry: number of frames before the place, and the fields of ``Context`` at the place.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -81,7 +83,10 @@ class Walk:
         self.ends.append(end)
 
     def known_after(self, count: int, expectation: Expectation) -> Context:
-        """Return what the decoder knows after the first ``count`` frames of this walk."""
+        """Return the context in which the frame after the first ``count`` frames is judged.
+
+        The context is what the decoder knows from earlier frames.
+        """
         place = len(self.known) - 1
         while self.known[place][0] > count:
             place -= 1
@@ -95,10 +100,11 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a complete frame begins at ``at``, the end of a frame with unusual content.
 
-    If so, a shock of the robot has caused the unusual content, not damage. If the complete frame is
-    followed by bytes that cannot begin another frame, the result is False.
+    A complete frame shows that the unusual content comes from a shock of the robot, not from
+    damage. The result is False if the bytes after the complete frame cannot begin another frame.
 
-    ``closed``: whether no more bytes come. If ``held`` ends at ``at``, the result is ``closed``.
+    ``held``: the bytes that the decoder holds. ``closed``: whether no more bytes come. This is the
+    result if ``at`` is the end of ``held``.
     """
     if at == len(held):
         return closed
@@ -117,10 +123,11 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Add the expected frames from ``at`` on to ``walk``.
+    """Decode the expected frames in ``held``, the first of which begins at ``at``.
 
-    Return the end of the last added frame, and what is known after this frame. The last expected
-    frame is not added if its last byte may belong to the next header.
+    Add the decoded frames to ``walk``. Return the end of the last added frame, and what is known
+    after this frame. The last expected frame is not added if its last byte may belong to the next
+    header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

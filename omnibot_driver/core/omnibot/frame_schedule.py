@@ -22,9 +22,10 @@ LENGTH: Final[dict[Kind, int]] = {ImuFrame: 14, DeltaFrame: 9, PoseFrame: 15}
 class Cycle:
     """A repeating sequence of frame kinds.
 
-    ``after[kind][at]``: the new position in the sequence when the position is ``at`` and a frame of
-    ``kind`` arrives. The new position is directly after the next place for this kind. Frames that
-    were due before this place are regarded as lost.
+    A position in the sequence is the index of the frame that is due next. ``after[kind][at]``: the
+    new position if a frame of ``kind`` arrives at the position ``at``. If a frame of another kind
+    is due at ``at``, all frames that are due before the next frame of ``kind`` are regarded as
+    lost.
     """
 
     def __init__(self, *kinds: Kind) -> None:
@@ -59,12 +60,12 @@ class FrameSchedule:
         self._imus = self._lost = 0
 
     def hear(self, kind: Kind, skipped: int) -> int:
-        """Record a received frame of this kind; return how many IMU frames were lost before it.
+        """Record that a frame of ``kind`` arrived; return how many IMU frames were lost before it.
 
         ``skipped``: number of discarded bytes before the frame.
 
-        For a pose, the result is 0. IMU frames that were lost before a pose are counted in the
-        result for the next frame that is not a pose.
+        For a pose, the result is 0. The IMU frames that were lost before a pose are counted in the
+        result for the next delta or IMU frame.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

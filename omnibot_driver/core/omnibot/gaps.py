@@ -55,8 +55,9 @@ class InterFrameGaps:
     """The pauses within the bytes that the decoder holds, and what is known of this line's pauses.
 
     * ``byte_s``: time in s that the line takes for a byte.
-    * ``between``: whether the read after a pause normally contains the beginning of a frame.
-    * ``sharp``: whether this beginning normally is the first byte of the read.
+    * ``between``: whether pauses normally are between frames, so that a frame begins in the read
+      after a pause.
+    * ``sharp``: whether a frame normally begins with the first byte after a pause.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
       further confirmations are not counted.
     * ``at_pace``: whether the line was busy for the whole time between the last two reads.
@@ -117,7 +118,10 @@ class InterFrameGaps:
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Check whether the pauses are between accepted frames.
+        """Learn from accepted frames whether this line's pauses are between frames.
+
+        For each pause, compare the pause's position with the frames, and update ``between`` and
+        ``sharp``.
 
         ``ends``: for each accepted frame, the position of its end in the bytes that the decoder
         holds.
@@ -139,9 +143,10 @@ class InterFrameGaps:
         )
 
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
-        """Return whether only later bytes can show the cause of a pause in ``data[start:end]``.
+        """Return whether only later bytes can show the cause of a pause in a supposed frame.
 
-        The result is False if one of the pauses in these bytes certainly comes from an idle line.
+        ``data[start:end]``: the supposed frame, which may contain several pauses. If one of these
+        pauses certainly comes from an idle line, the result is False.
         """
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
@@ -176,7 +181,7 @@ class InterFrameGaps:
         self._reads = [Read(end - count, now) for end, now in self._reads if end > first]
 
     def clear(self) -> None:
-        """Forget all pauses in the bytes that the decoder holds, and the times of all reads."""
+        """Forget the times of all reads, and all pauses in the bytes that the decoder holds."""
         self.gaps, self._reads = [], []
 
     def _within(self, start: int, end: int) -> Iterator[Gap]:

@@ -29,7 +29,8 @@ from omnibot_driver.core.omnibot.frames import (
 from omnibot_driver.core.omnibot.schedule import TICK_S
 
 IDLE_S: Final = 0.1
-"""Long pause in s: ten of the board's ticks. An adapter only causes pauses of 16 ms or less."""
+"""Shortest pause, in s, that is regarded as long: ten of the board's ticks. The pauses that an
+adapter causes are at most 16 ms long."""
 HALF_TICK_S: Final = TICK_S / 2
 """Half of a tick, in s. A frame that is late by less than this is regarded as on time."""
 GAP_S: Final = 4e-3
@@ -52,8 +53,9 @@ FEW_BYTES: Final = 2
 TICKS_TO_PROVE: Final = 2
 """Number of further late ticks, after a first late tick, that prove that bytes were lost.
 
-Each further tick must be in a separate read, and must be as late as the first late tick. After a
-pause of ``IDLE_S`` or more, one further tick is enough.
+Lost bytes make all later ticks seem late by the same time. So each further tick must be as late as
+the first late tick, and must be in a separate read. After a pause of ``IDLE_S`` or more, one
+further tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Largest number of bytes after a frame that are searched for the cause of a pause in this frame.
@@ -86,8 +88,8 @@ _END: Final = attrgetter("end")
 class Gap(NamedTuple):
     """A pause between two reads, caused by an idle line or by a late reader.
 
-    * ``first``, ``before``: the place of the pause among the bytes held. The pause is directly
-      before one of the bytes at the positions ``first`` to ``before`` - 1.
+    * ``first``, ``before``: range of positions among the bytes that the decoder holds. The first
+      byte after the pause is at one of the positions from ``first`` to ``before`` - 1.
     * ``price``: cost of an interpretation in which the line was idle and a frame contains the
       pause.
     * ``pause_s``: time in s between the two reads.
@@ -166,11 +168,15 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause within a frame, as far as the next frame shows it.
+    """Return the cause of a pause within a supposed frame, as shown by the bytes after this frame.
 
-    The line was idle if the next frame also contains a pause, and if the two pauses end a whole
-    number of ticks apart. Each of the two frames then consists of parts of two real frames. The
-    line was also idle if the next bytes are not a frame.
+    * If these bytes are not a frame, the line was idle.
+    * If these bytes are a frame with a pause in it, the time between the ends of the two pauses
+      decides. The line was idle if this time is a whole number of ticks: each supposed frame then
+      consists of parts of two frames that the board sent.
+    * Otherwise, the reader was late.
+
+    The result is UNDECIDED while the next frame is incomplete.
 
     ``start``: position of the next frame. ``first``: the read that ended the pause in the earlier
     frame.

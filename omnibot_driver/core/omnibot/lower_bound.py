@@ -62,12 +62,11 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return, for each position where an undamaged frame may start, the end of its row.
+    """Return the end of each row of undamaged frames.
 
-    The row consists of this frame and of the undamaged frames that follow it without a gap.
-
-    The keys are the positions where the frames start, in descending order. The values are the
-    positions where the rows end.
+    In a row, each frame begins where the previous frame ends. The keys are the positions where an
+    undamaged frame may start, in descending order. Each value is the position where the row that
+    starts at the key ends.
     """
     size = len(data)
     ends: dict[int, int] = {}

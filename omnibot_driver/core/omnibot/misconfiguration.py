@@ -20,9 +20,9 @@ SURE: Final = 10
 confirms it. The board sends this number of poses in 2 s."""
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""``SMALLEST``, ``LARGEST``: limits of a coordinate other than 0, in mm or mrad.
+"""``SMALLEST``, ``LARGEST``: limits of the magnitude of a pose's coordinate, in mm or mrad.
 
-A value outside was read in the wrong byte order.
+A coordinate outside these limits was read in the wrong byte order, except a coordinate of 0.
 """
 POSE_PERIODS: Final = 2
 """Longest time between two poses that are compared with each other, in periods of the poses. With
@@ -38,10 +38,10 @@ and above ``TIMES`` times the error in the other frame.
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""Limits for the advice to change the configured period of the deltas.
+"""``FEWEST_DELTAS``, ``FOR_S`` (in s): limits for the advice to change ``delta_period``.
 
-The driver gives the advice only if at least ``FEWEST_DELTAS`` deltas in a row show the same other
-period, for at least ``FOR_S`` (in s).
+The driver gives the advice if deltas show a period that differs from the configured one. At least
+``FEWEST_DELTAS`` deltas in a row must show the same period, for at least ``FOR_S``.
 """
 RATE_TOLERANCE: Final = 0.1
 

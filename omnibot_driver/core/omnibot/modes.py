@@ -42,7 +42,7 @@ TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
 
 
 class ModeTracker:
-    """The mode of the board, inferred from events by the table.
+    """The mode of the board, inferred from events by the table ``TRANSITIONS``.
 
     An event that the table does not allow raises RequestRefused and changes nothing.
     """
@@ -55,7 +55,10 @@ class ModeTracker:
         yet."""
 
     def apply(self, happening: Happening) -> None:
-        """Apply one event of the table. Raises RequestRefused if the mode does not allow it."""
+        """Change the mode as ``TRANSITIONS`` says for this event.
+
+        Raises RequestRefused if the event is not allowed in the present mode.
+        """
         try:
             self.mode = TRANSITIONS[happening][self.mode]
         except KeyError:

@@ -35,9 +35,9 @@ board's pose can then prove a restart.
 EARLY_S: Final = 0.2
 """Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-If the counter began at zero, its count times the period is less than the time since the last delta
-was read. The product is larger only if the driver read the last delta very late. The tolerance
-allows for such a late read.
+If the counter began at zero, its count times the period is the counter's age in s. This age is
+normally less than the time since the last delta was read. The age is greater only if the driver
+read the last delta very late. The tolerance allows for such a late read.
 """
 LONG_GAP_S: Final = 1.0
 """Longest gap before a pose, in s, after which this pose can still show a restart of the board. The
@@ -52,9 +52,9 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` is True although the board has probably continued. Two
-      findings show this. After a pause: fewer deltas were lost if the board continued than if it
-      restarted. After a silence: the delta has the next count.
+    * ``doubtful``: whether ``restarted`` is True although the board has probably continued. After a
+      pause, this is so if a restart would mean more lost deltas than a continued count. After a
+      silence, this is so if the new delta has the next count.
     """
 
     lost: int
@@ -106,10 +106,13 @@ class Sequence:
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
-        The duration of the pause is unknown. If the next delta does not continue the count, the
-        driver supposes a restart, even if the count is not low: the first deltas after a restart
-        may be lost. A pose can disprove the restart. Without poses, nothing can disprove it, so the
-        driver supposes a restart only if the count is low.
+        The duration of the pause is unknown. What the driver supposes if the next delta does not
+        continue the count depends on the poses:
+
+        * If the board sends poses, the driver supposes a restart even if the new count is high,
+          because the first deltas after a restart may be lost. A pose can disprove the restart.
+        * Without poses, nothing can disprove a restart. The driver supposes a restart only if the
+          new count is low.
         """
         self._paused, self._pose = True, None
 

@@ -51,8 +51,8 @@ number is below 4096.
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The next read is late if it contains too many bytes for the time since the previous read. There are
-too many bytes if the board needs more than twice this time, plus ``BURST_S``, to send the bytes.
+The next read is late if its bytes are too many for the time since the previous read: the board
+needs more than twice the time since the previous read, plus ``BURST_S``, to send these bytes.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
@@ -133,12 +133,15 @@ class Translation:
         return sent_s if waited and -math.inf < sent_s < now - LEAST_S else now
 
     def apply(self, happening: Happening) -> None:
-        """Apply an event to the mode. Raises RequestRefused if the mode forbids it."""
+        """Change the mode as the mode table says for this event.
+
+        Raises RequestRefused if the event is not allowed in the present mode.
+        """
         self._catch_up()
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Update mode, schedule and IMU count by the frames that ``single_imu`` decoded."""
+        """Count the IMU frames that ``single_imu`` decoded, and update mode and schedule."""
         singles = self._most_singles - self.singles_to_come
         self.singles_to_come = self._most_singles = 0
         if singles:

@@ -6,7 +6,7 @@ An interpretation is a path in a graph. The edges of the graph are frames, damag
 unexplained bytes, each with a cost. A frame on the cheapest path is sure if every path without this
 frame costs clearly more.
 
-This module knows how a line damages the shapes of frames; it does not know which frames are
+This module knows which lengths a damaged frame can have; it does not know which frames are
 accepted.
 """
 

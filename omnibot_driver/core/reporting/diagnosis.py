@@ -19,16 +19,16 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Mean delay of reads, in s. If the mean delay is larger, the reads are reported as late. An
-adapter that delivers bytes every 10 ms has a mean delay of 5 ms, and is just not reported."""
+"""Limit for the mean delay of reads, in s. The driver reports late reads if the mean delay is
+larger. An adapter that delivers bytes every 10 ms has a mean delay of exactly this limit, so its
+reads are not reported."""
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
-"""Time in s for which the estimated difference of the clocks' rates must be too large before it is
-reported.
+"""The driver reports a clock skew above ``LARGEST_SKEW_PPM`` that lasts longer than this time in s.
 
-After this time, the earlier arrival times no longer affect the estimate. A difference that lasts
-for a shorter time may come from a busy computer.
+The clock skew is the estimated difference of the clocks' rates. A busy computer delays reads, which
+disturbs the estimate for this time at most. So a skew that lasts longer is real.
 """
 
 BUSY_SHARE: Final = 0.1

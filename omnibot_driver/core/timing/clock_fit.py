@@ -20,8 +20,9 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-An adapter with a timer delays reads by different times. If the timer's period is wrong by 100 ppm,
-the delays repeat every 20 s. So 75 s are long enough to contain the smallest delay.
+An adapter with a timer delays each read until the timer expires, so the delay changes from read to
+read. If the timer's period is wrong by 100 ppm, the delays repeat every 20 s. The blocks cover a
+longer time, so they contain the smallest delay.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
@@ -41,10 +42,11 @@ LATE_PART: Final = 0.1
 ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest difference between the upper and the lower bound of a block, as a fraction of a period.
+"""Limit for the distance between a block's upper and lower bound, as a fraction of a tick's period.
 
-If the bounds differ more, the lower bound is not used. The bounds of an adapter with a 16 ms timer
-differ by less than 2 ms, which is a fifth of a 10 ms tick.
+Each block of ticks gives two bounds of the fitted clock. If their distance is larger, the lower
+bound is not used. With an adapter's 16 ms timer, the distance is less than 2 ms, which is a fifth
+of a 10 ms tick.
 """
 
 Point = tuple[int, float]
