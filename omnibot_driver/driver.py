@@ -128,7 +128,10 @@ def in_plain_words(text: str) -> str:
 
 
 def too_large(domain: str) -> bool:
-    """Return whether this ROS domain is so large that Fast DDS would silently end the process."""
+    """Return whether the number of this ROS domain is too large for Fast DDS.
+
+    With such a number, Fast DDS would silently end the process.
+    """
     return domain.isdecimal() and int(domain) > LARGEST_DOMAIN
 
 
@@ -210,8 +213,8 @@ def _run(ending: Ending, args: list[str]) -> None:
 def _set_deadline() -> None:
     """End the process by force if the shutdown takes longer than 5 s (``LONGEST_END_S``).
 
-    The guard process then stops the robot. If no thread can be started, there is no deadline: the
-    shutdown must stop the robot even then.
+    The guard process then stops the robot. If the thread for this deadline cannot be started, the
+    shutdown goes on without a deadline, because it must still stop the robot.
     """
 
     def give_up() -> None:

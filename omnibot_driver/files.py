@@ -21,12 +21,14 @@ def write_whole(
 ) -> bool:
     """Write a text file in UTF-8, and create its folder if needed.
 
-    An existing file is replaced. Return whether the file was written. Raises OSError.
+    The content is written to a temporary file, which then replaces the file ``path``. Return
+    whether ``path`` was replaced or created. Raises OSError.
 
-    ``write``: function that writes the content to the open file. Line ends are not converted.
+    ``write``: function that writes the content to the open temporary file. Line ends are not
+    converted.
 
-    ``wanted``: function that is called after the content is written. If it returns False, the file
-    is not written, and an existing file stays as it was.
+    ``wanted``: function that is called before the replacement. If it returns False, the temporary
+    file is deleted, and an existing file ``path`` stays as it was.
     """
     import tempfile  # takes 1 MB, and few drivers ever write a file
 

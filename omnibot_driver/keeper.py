@@ -110,7 +110,11 @@ class Keeper:
                 process.wait(max(0.0, until - time.monotonic()))
 
     def _beat(self, process: subprocess.Popen[bytes], word: bytes) -> str:
-        """Send this guard a heartbeat. If the guard died or hangs, kill it; return the reason."""
+        """Send the guard a heartbeat; return the reason if the guard has failed, otherwise "".
+
+        If the guard has died or hangs, the keeper gives it up, and kills the process if it still
+        runs.
+        """
         assert process.stdin is not None
         pipe = process.stdin.fileno()
         try:

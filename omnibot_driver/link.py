@@ -31,12 +31,12 @@ STANDS_WITHIN_S: Final = 0.5
 """Limit, in s, for the wait at shutdown for a proof that the robot is at rest. For a slow board,
 the limit is larger."""
 UNGUARDED_S: Final = 1.5
-"""Limit, in s, for the wait at shutdown for a proof that the robot is at rest, if no guard can
-repeat Stop after the shutdown. For a slow board, the limit is larger."""
+"""Longest wait at shutdown, in s, if no guard can repeat Stop after the shutdown. The driver waits
+for a proof that the robot is at rest. For a slow board, the limit is larger."""
 SILENCE_S: Final = 0.25
-"""Longest wait at shutdown, in s, for the second proof that the robot is at rest. For a slow board,
-the driver waits longer. A Stop that is damaged on the line may move the robot; the second proof
-shows that the last Stop did not move it."""
+"""Longest wait at shutdown, in s, for the second proof that the robot is at rest. This proof comes
+after the last Stop, and shows that the line did not damage this Stop: a damaged Stop could move the
+robot. For a slow board, the limit is larger."""
 BOTH_PROOFS_S: Final = 2.4
 """Longest total time at shutdown, in s, for the two proofs that the robot is at rest. The guard
 needs the remaining part of ``driver.LONGEST_END_S`` to repeat Stop."""
@@ -45,10 +45,10 @@ T = TypeVar("T")
 
 
 class Link:
-    """One session on one port, which is opened again whenever it is lost.
+    """One session with one board. The link opens the board's ports, and opens lost ports again.
 
-    * ``port``: name of the port in messages to the user.
-    * ``report``: receives a sentence when a port is missing, and None when all are open.
+    * ``port``: name of the ports in messages to the user.
+    * ``report``: receives a sentence when a port is missing, and None when all ports are open.
     * ``failed``: receives the exception that ended a thread, which is always a bug.
 
     All function arguments except ``opener`` and ``failed`` are called one at a time, on any thread,

@@ -41,10 +41,11 @@ rad, and rates in rad/s (empty if unknown)."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
-    """What messages contain besides measurements: frames, standard deviations and wheels.
+    """What messages contain besides measurements: frame names, standard deviations and wheels.
 
-    Frame names include the prefix. Standard deviations are in SI units, and 0 if the board has no
-    parameter for them.
+    Frame names begin with the parameter ``frame_prefix``. The standard deviations of measured
+    values are in SI units; a value for which the board has no such parameter has the standard
+    deviation 0.
     """
 
     odom_frame: str
@@ -138,7 +139,10 @@ def unturned(kinematics: Kinematics) -> Wheels:
 
 
 def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -> Wheels:
-    """Return the state of the wheels after ``estimate``. ``before``: their previous state."""
+    """Return the angles and rates of the wheels after the motion that ``estimate`` reports.
+
+    ``before``: the state of the wheels before this motion.
+    """
     rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
     way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
     angles = tuple(map(add, angles, kinematics.wheel_rates(way)))

@@ -158,7 +158,8 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock, which may jump back.
 
-        While the clock is 0 or too late for ROS time, only events without a stamp are published.
+        While the clock shows 0, or a time too large for a ROS stamp, only events without a stamp
+        are published.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -243,9 +244,10 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text is new since the last change of state, and remember it.
+        """Return whether the driver has not logged this text since the last change of state.
 
-        Changes to disconnected and connecting do not count.
+        The text is then regarded as logged. A change to the state disconnected or connecting does
+        not make earlier texts new again.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

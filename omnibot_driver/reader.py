@@ -179,9 +179,10 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Let the session process received bytes whose measurements are already delivered.
+        """Let the session process the bytes that it has decoded with ``hear``.
 
-        The result can be a command to the board. The caller holds the lock.
+        The reader has already delivered the IMU estimates that ``hear`` returned. The processing
+        can result in a command to the board. The caller holds the lock.
         """
         if self._session.inbound.process(now):
             self._shared.settle()

@@ -69,8 +69,9 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that the URL names, with a topic for at least one channel.
+    """Return the recording that the URL names.
 
+    ``channels``: names of the board's channels. The bag must have a topic for at least one of them.
     Raises ParameterError if the URL or the bag is wrong.
     """
     location, _, query = url[len(SCHEME) :].partition("?")

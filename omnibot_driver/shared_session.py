@@ -58,9 +58,9 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line. If it wrote this Stop to a port that
-        it had lost and opened again, this is True only if a standstill was still to be
-        proved (``Shutdown.owed``)."""
+        """Whether the link wrote its last Stop to every line. If the link first had to open a lost
+        port again, the value is True only if a proof of a standstill was still missing
+        (``Shutdown.owed``)."""
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
         line, and measurements showed the robot at rest after the last motion command."""
@@ -94,12 +94,12 @@ class SharedSession:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Call ``action`` with the session and ``wish``, the motion that a sender commands.
+        """Call ``action`` with the session, the commanded motion ``wish``, and the time in s.
 
-        * ``sent_ns``: possible times at which the command was sent, as time of day in ns. There
-          are two if the sender's clock is uncertain, and none for a command to stop.
-        * ``moves_base``: whether the command moves the base, so that the motion interlock must know
-          of a refusal.
+        * ``sent_ns``: possible times at which the command was sent, as time of day in ns. There are
+          two if the sender's clock is uncertain, and none for a command to stop.
+        * ``moves_base``: whether the command moves the base. If such a command is refused, the
+          motion interlock records the refusal.
 
         Raises CommandRefused if ``action`` refuses the command, or if the command may have been
         sent before or during a recent stall of this process. The constructor's argument ``refused``

@@ -35,11 +35,11 @@ when its driver has run for a while."""
 
 
 class Robot:
-    """The demo's robot, which this ROS node observes and steers through the driver's topics.
+    """A ROS node that observes and steers the demo's robot through the driver's topics.
 
-    After every second odometry message, the object publishes a velocity on ``cmd_vel``.
-    ``driving``: whether this velocity drives the square. Otherwise it is zero. ``leg``: how many
-    sides of the square are complete.
+    After every second odometry message, the node publishes a velocity on ``cmd_vel``. ``driving``:
+    whether this velocity drives the square; otherwise the velocity is zero. ``leg``: how many sides
+    of the square are complete.
 
     Raises DemoFailed if ROS does not start.
     """

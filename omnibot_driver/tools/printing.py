@@ -19,7 +19,7 @@ def replace_unprintable() -> None:
 
 @contextmanager
 def printing() -> Iterator[None]:
-    """A context that only prints.
+    """A context for a block that only prints: a failure to print becomes an exception.
 
     Raises BrokenPipeError if the pipe's reader has ended, and ToolError if standard output cannot
     be written for another reason.

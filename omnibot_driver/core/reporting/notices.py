@@ -30,8 +30,8 @@ STOP_UNSEEN: Final = (
     " Stop for 5 s after each stop; check by eye that the robot has stopped"
 )
 STOP_BLIND: Final = (
-    "stop unconfirmed: after a motion command like the last one, the board does not measure its"
-    " wheels; check by eye that the robot has stopped (reported once)"
+    "stop unconfirmed: the board measures its wheels only after some motion commands, and not after"
+    " the last one; check by eye that the robot has stopped (reported once)"
 )
 STOP_UNANSWERED: Final = (
     "stop unconfirmed: the board is not responding; if the robot moves, cut its motor power; then"

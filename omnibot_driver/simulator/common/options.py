@@ -75,14 +75,14 @@ def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> 
 def from_arguments(
     arguments: argparse.Namespace, simulator: SimulatorModule
 ) -> tuple[SimulatedBoard, list[Line]]:
-    """Return the board and its lines to the computer, as the parsed arguments describe them."""
+    """Return the simulated board and its lines, as the parsed arguments describe them."""
     return simulator.from_arguments(arguments), [
         _line(arguments, channel, number) for number, channel in enumerate(simulator.CHANNELS)
     ]
 
 
 def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list[Line]]:
-    """Return the board and its lines from a URL such as ``sim://?seed=1&imu_only``.
+    """Return the simulated board and its lines for a URL such as ``sim://?seed=1&imu_only``.
 
     Raises OptionError for an unknown option or an invalid value.
     """
@@ -99,7 +99,7 @@ def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list
 def from_words(
     words: Sequence[str], simulator: SimulatorModule
 ) -> tuple[SimulatedBoard, list[Line]]:
-    """Return the board and its lines to the computer, as command line arguments describe them.
+    """Return the simulated board and its lines, as command line arguments describe them.
 
     Raises OptionError for an unknown option or an invalid value.
     """

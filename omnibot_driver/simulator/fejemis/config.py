@@ -23,8 +23,9 @@ class DriveConfig:
     """Configuration of the drive Teensy.
 
     * ``wheel_base_m``: distance between the driving wheels, for the odometry.
-    * ``confs_m``: the same distance for the control of turns, and the distance from the axle to the
-      steered wheel (the manual's B and F).
+    * ``confs_m``: two distances for the control of turns, the manual's B and F. B is a second value
+      for the distance between the driving wheels. F is the distance from the axle to the steered
+      wheel.
     """
 
     number: int

@@ -157,7 +157,8 @@ def wheel_speeds(
     * Outer wheel: ``v2 = sqrt(v² + w²)`` with the sign of ``v``.
     * Inner wheel: ``v1 = v2 - v2 B / d``, with ``d = max(f / tan(theta) + B / 2, B / 4)``.
 
-    ``v``: speed. ``w``: turn rate. ``theta``: angle of the front wheel. ``B``: ``base_m``. ``f``:
+    ``v``: speed in m/s. ``w``: turn rate in rad/s; the manual adds the squares of ``v`` and ``w``
+    although their units differ. ``theta``: angle of the front wheel. ``B``: ``base_m``. ``f``:
     ``steer_m``.
     """
     if speed == 0.0 and turn_radps == 0.0:

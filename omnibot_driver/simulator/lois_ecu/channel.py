@@ -136,7 +136,7 @@ class WheelChannel:
         self.duty_percent = max(-LIMIT_PERCENT, min(LIMIT_PERCENT, percent))
 
     def release(self) -> None:
-        """Stop the motor because the e-stop button was pressed or released.
+        """Stop the motor, as the board does when its e-stop button is pressed or released.
 
         The button acts like a command of zero in the current mode, open or closed loop.
         """

@@ -18,7 +18,8 @@ class DocumentedOdometry:
     """Odometry from signed ticks and measured speeds, as the manual describes it.
 
     * ``pose``: x and y in m, and yaw in rad.
-    * ``velocity``: along the axes of the pose, in m/s, m/s and rad/s.
+    * ``velocity``: in m/s, m/s and rad/s, along the fixed axes of x and y, not along those of the
+      robot.
     """
 
     def __init__(self, steps: int, radius_m: float, track_m: float) -> None:
@@ -52,6 +53,8 @@ class DocumentedOdometry:
 
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each encoder tick, from the latest RPMs.
+
+    Each argument switches one fault of the firmware on:
 
     * ``stands``: the position does not change while both RPMs are equal.
     * ``divides``: the velocity is NaN or infinite if two ticks have the same time.

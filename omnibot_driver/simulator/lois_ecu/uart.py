@@ -43,7 +43,7 @@ class Uart:
 
     @property
     def deaf(self) -> bool:
-        """Whether the board sends the current data with interrupts off, and may lose input."""
+        """Whether the board is sending with interrupts off, so that received bytes may be lost."""
         return bool(self._sending) and self._sending[0][1]
 
     def receive(self, data: bytes) -> None:

@@ -42,9 +42,9 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: for each encoder, one factor for the short levels of its signal, and one for
-    the long levels. The board multiplies the durations of the levels by these factors. The
-    simulated levels have the lengths for which the factors are exact.
+    ``corrections``: for each encoder, the board's two factors for the durations of levels. The
+    board multiplies the durations of short levels by the first factor, and those of long levels by
+    the second. The simulation chooses the lengths of the levels so that these factors are exact.
     """
 
     def __init__(

@@ -56,11 +56,12 @@ class Motion:
 
     * ``running``: whether the motion is in progress; the server then refuses other motions.
     * ``watching``: whether the module ``alarms`` supervises the motion.
-    * ``posts``: number of reports of a start or an end that are kept until a port waits for one.
+    * ``posts``: number of reports that the server keeps. A report says that a motion has started or
+      ended. The server keeps a report if no port waits for it yet.
     * ``right``, ``left``: motor registers, as the server knows them.
     * ``sampled_s``: time of the last sample of the IMU, or -1.
     * ``moved_s``, ``turned_s``: first and last time at which the right wheel turned.
-    * ``released``: whether the stop port ended the motion.
+    * ``released``: whether a command at the stop port ended the motion.
     """
 
     def __init__(self, kind: Kind) -> None:

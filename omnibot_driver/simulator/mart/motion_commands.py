@@ -119,7 +119,7 @@ def reference(server: "MartServer", text: str) -> str | None:
 
 
 def change_reference(server: "MartServer", text: str) -> str | None:
-    """Change both motors in a forward drive (RMCS); the reply has the relative heading."""
+    """Change the motor speeds in a forward drive (RMCS). Reply with the relative heading."""
     motion = server.motions[Kind.REFERENCE]
     if not motion.running:
         return "fail no motion in progress"

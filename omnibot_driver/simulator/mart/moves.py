@@ -3,8 +3,9 @@
 """The start of each kind of motion, and its end by a command.
 
 A start or an end has several steps, each of which is a function. The server calls each function
-with itself as an argument, so a copy of the server can continue what the original has begun. This
-module does not know the words of commands.
+with itself as the first argument. So if a test makes a second server with ``MartServer.copy``, the
+second server can continue a motion that the first has begun. This module does not know the words of
+commands.
 """
 
 from typing import TYPE_CHECKING

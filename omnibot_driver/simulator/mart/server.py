@@ -169,9 +169,10 @@ class MartServer(ServerState):
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
+        """Call ``then`` when a motion of ``kind`` is reported to ``port`` as started or ended.
 
-        If ``post`` has kept an earlier report, ``then`` is called at once.
+        The method ``post`` makes these reports. If no port has waited for an earlier report, the
+        report was kept, and ``then`` is called at once.
         """
         motion = self.motions[kind]
         if motion.posts:

@@ -17,8 +17,8 @@ class Quirks:
     ``heading_in_reference_moves_only`` and the three deviations after it were found in the public
     source, not on the running server.
 
-    * ``stop_port_keeps_motion``: SL stops F, B and RM, but later motions are refused, and a later
-      SM or SRM hangs the command port.
+    * ``stop_port_keeps_motion``: SL stops F, B and RM, but the server still regards the motion as
+      running: it refuses later motions, and a later SM or SRM hangs the command port.
     * ``spin_stop_ends_drives``: SS stops F, B and RM, as SL does.
     * ``early_stop_is_ignored``: the stop port has no effect before the reply to F, B, R, L or RM.
     * ``left_spin_in_reference_move``: L is accepted during RM, and hangs the command port.
@@ -41,7 +41,8 @@ class Quirks:
     * ``log_deletes_files``: LOG deletes the files of LAST MOVE and LAST TURN.
     * ``unknown_reset_repeats``: RST with an unknown word repeats the previous reply.
     * ``clock_moves_heading``: TIME in a motion adds turn rate * clock jump to the heading.
-    * ``undocumented_commands``: without this quirk, ENC is the only undocumented command.
+    * ``undocumented_commands``: the server has several undocumented commands. Without this quirk,
+      it has only one of them, ENC.
     * ``heading_in_reference_moves_only``: the heading of RMRA changes in RM only.
     * ``probe_turns``: MCR 0 runs the motors until the wheel moves; with a dead IMU, for 0.5 s.
     * ``heading_starts_off``: the first sample of RM adds half the turn rate times the time since
@@ -87,8 +88,8 @@ FIRMWARE = Quirks(
 )
 """Quirks that were observed on the running public server."""
 SOURCE = replace(FIRMWARE, spin_stop_ends_drives=False, **dict.fromkeys(_SOURCE_ALONE, True))
-"""Quirks in the public source code: those of ``FIRMWARE`` except one that the source code
-contradicts, and four that were found only in the source code."""
+"""Quirks in the public source code. They are the quirks of ``FIRMWARE``, without the one that the
+source code contradicts, but with four that were found only in the source code."""
 
 Firmware = Literal["documented", "firmware", "source"]
 QUIRKS: dict[Firmware, Quirks] = {

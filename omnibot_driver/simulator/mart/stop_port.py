@@ -35,9 +35,11 @@ def obey(server: "MartServer", text: str) -> None:
 def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop a drive (F, B, RM) or a spin (R, L). Return whether to wait for the end of the motion.
 
-    * A motion that is already stopping is not stopped again. The result is then True for a drive,
-      and False for a spin.
-    * A drive that the module ``alarms`` no longer watches is not stopped. The result is then False.
+    The result is True if this call stops the motion. In three cases, the call stops nothing:
+
+    * A spin is already stopping. The result is False.
+    * A drive is already stopping. The result is True.
+    * A drive is not stopping, and the module ``alarms`` no longer watches it. The result is False.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

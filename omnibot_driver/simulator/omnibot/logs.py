@@ -14,8 +14,8 @@ CommandKind = Literal["velocity", "pose", "wheels", "estop", "start", "pause", "
 class ReceivedCommand:
     """A command that the board obeyed.
 
-    tick: number of the board's ticks before it obeyed the command.
-    values: the three words of a control frame; zeros for a state letter.
+    * ``tick``: number of ticks that the simulation had made when the board obeyed the command.
+    * ``values``: the three words of a control frame; zeros for a state letter.
     """
 
     tick: int

@@ -49,7 +49,7 @@ MANUAL = WheelGains()
 
 
 class Motor:
-    """A gear motor with its quadrature encoder, advanced one tick at a time."""
+    """A gear motor with its quadrature encoder, simulated in steps of one board tick (10 ms)."""
 
     def __init__(self, constants: MotorConstants = USUAL) -> None:
         self._constants = constants
@@ -114,7 +114,10 @@ class WheelController:
         self._last_error = 0.0
 
     def update(self, target: float, measured: float) -> float:
-        """Return the PWM for the coming tick from speeds in counts per tick."""
+        """Return the PWM for the next tick.
+
+        ``target``, ``measured``: commanded and measured speed of the wheel, in counts per tick.
+        """
         gains, error = self._gains, target - measured
         self._feedback += gains.proportional * (error - self._last_error)
         self._last_error = error

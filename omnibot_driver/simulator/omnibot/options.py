@@ -59,7 +59,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wakes-while-booting",
         action="store_true",
-        help="count bytes that arrive during the boot as wake-up bytes (the board needs three)",
+        help="let bytes that arrive during the boot wake the receiver, which needs three bytes;"
+        " without this option, such bytes are lost",
     )
     parser.add_argument(
         "--ignore-estop", action="store_true", help="simulate a firmware without emergency stop"

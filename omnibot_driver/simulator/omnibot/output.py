@@ -24,7 +24,7 @@ class Output:
         self.pause()
 
     def pause(self) -> None:
-        """Begin a pause: the first text comes at once, with the number zero."""
+        """Begin a pause of the board. Its first text, with the number 0, is due at once."""
         self._ticks_to_text = self._number = 0
 
     def text(self) -> list[bytes]:

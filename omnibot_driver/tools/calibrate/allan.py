@@ -15,8 +15,8 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Smallest number of successive averages of the readings from which an Allan deviation is computed.
-So the longest averaging time is one ninth of the recording."""
+"""Minimum number of successive averages of the readings from which an Allan deviation is computed.
+The longest averaging time is thus the duration of the recording divided by this number."""
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 58.0
 """Shortest recording, in s, from which bias instability and random walk are estimated. It is a

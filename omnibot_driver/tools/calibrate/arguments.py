@@ -19,8 +19,8 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter that exists only if the board records encoder ticks and its gains can be
-set."""
+"""Name of a parameter. If a board has this parameter, the board records encoder ticks, and the
+gains of the board's speed controller can be set."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),

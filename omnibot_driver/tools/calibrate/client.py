@@ -28,8 +28,9 @@ REQUESTS: Final = 3
 """Number of times that the tool sends a request that may be repeated. The middleware drops an
 answer if the driver discovers the new client too late."""
 SPIN_S: Final = 0.005
-"""Time, in s, for which each call of the executor waits. All calls use the same time. If the times
-differed, rclpy would not handle the messages of the e-stop on a busy computer."""
+"""Time, in s, for which each call of the executor waits. All calls use the same time, because rclpy
+begins its round of callbacks again after a change of the time. On a busy computer, the round would
+then never come to the messages of the e-stop."""
 
 
 class Client:

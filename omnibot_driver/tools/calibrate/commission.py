@@ -271,7 +271,8 @@ class Walk:
         )
         turn_rad = require_left_turn(self._robot.rest(TURN_BY_HAND_S).imu, bias(resting), level)
         self._console.say(
-            f"The gyro measured a turn to the left by {turn_rad:.1f} rad: gyro and gravity agree."
+            f"The gyro measured a turn to the left by {turn_rad:.1f} rad, as expected: gyro and"
+            " accelerometer agree about which way is up."
         )
         return found
 

@@ -22,8 +22,9 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""The tool warns if a wheel's radius differs from the mean by more than this fraction, and by more
-than three standard deviations."""
+"""Limit for the difference between a wheel's radius and the mean radius of all wheels, as a
+fraction of the mean. The tool warns if the difference is above this limit, and above three standard
+deviations of the difference."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark the"
     " floor under the robot's centre (use a plumb line, or a fixed point of the lowest deck), and"

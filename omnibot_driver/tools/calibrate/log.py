@@ -93,14 +93,14 @@ class Log:
 
     @property
     def wheels(self) -> Wheels:
-        """The wheels' rows as columns. A row is a timestamp, angles and rates (NaN if missing)."""
+        """The recorded wheel states as arrays: timestamps, angles and rates (NaN if missing)."""
         wheels = len(self.wheel_rows[0]) // 2 if self.wheel_rows else 0
         rows = _columns(self.wheel_rows, 1 + 2 * wheels)
         return Wheels(rows[:, 0], rows[:, 1 : 1 + wheels], rows[:, 1 + wheels :])
 
     @property
     def commands(self) -> Commands:
-        """The rows of commands as columns. A row is a time and three values."""
+        """The recorded commands as two arrays: times in s, and three values for each command."""
         rows = _columns(self.command_rows, 4)
         return Commands(rows[:, 0], rows[:, 1:4])
 

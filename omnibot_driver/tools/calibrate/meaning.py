@@ -20,8 +20,8 @@ STANDS_PART: Final = 0.1
 """Largest fraction of the commanded speed at which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""Largest speed in the second half of a drive, divided by the speed in the first half, at which the
-robot is regarded as stopping."""
+"""Limit for the ratio of the robot's speeds in the second and in the first half of a drive. If the
+second speed divided by the first is at most this limit, the robot is regarded as stopping."""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """Limits for the speed of a drive with twice the command, divided by the speed of the first drive.
 
@@ -34,8 +34,8 @@ PURE_TURN: Final = 0.5
 The ratio is 0 for correctly interpreted deltas, otherwise 2 or more.
 """
 ALIKE: Final = 0.35
-"""Largest difference of two angles that are regarded as equal, as a fraction of the robot's turn.
-"""
+"""Tolerance for the comparison of two angles, as a fraction of the angle by which the robot turned
+between two drives. Angles that differ by less are regarded as equal."""
 
 
 LEAST_M: Final = 1e-3

@@ -28,7 +28,8 @@ of ``cmd_vel`` are in m/s, m/s and rad/s, those of ``wheel_cmd`` in rad/s.
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Time, in s, that replaces ``LOOK_S`` for a board with one of the parameters ``SLOW``."""
+"""Time, in s, over which the tool compares the commanded with the measured motion, if the board has
+one of the parameters in ``SLOW``. For other boards, the time is ``LOOK_S``."""
 SLOW: Final = ("odom_rate", "front_wheel_offset")
 """Each of these parameters shows that a board's measured motion may follow a command late. Either
 the board rarely measures its motion, or its front wheel must first turn to the new direction."""

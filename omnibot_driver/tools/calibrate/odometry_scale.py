@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 LINES: Final = 2
 """Number of straight drives. If the user measures one of them wrongly, their results differ."""
 UNLIKE: Final = 4.0
-"""Number of standard deviations. If two ratios differ by more than this number, the tool warns."""
+"""Limit for the difference between the results of two drives of the same kind, in standard
+deviations of the difference. The tool warns if the difference is larger."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s. The tool
@@ -185,7 +186,7 @@ def result(
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw, for each drive, the user's measurement divided by the odometry's measurement."""
+    """Plot for each drive the user's measurement, divided by the odometry's measurement."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

@@ -188,7 +188,11 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
 
 def overshoot(rpm: Array, target_rpm: float) -> Array:
-    """Return the overshoot of a step response, as in ``Traits``."""
+    """Return the overshoot of a step response to the set-point ``target_rpm``.
+
+    The result is a fraction of the final speed or of ``target_rpm``, whichever is higher. ``rpm``:
+    the speed every 1 ms.
+    """
     reference = np.maximum(_final_rpm(rpm), target_rpm)
     return np.asarray(np.maximum(rpm.max(axis=0) / reference - 1.0, 0.0))
 

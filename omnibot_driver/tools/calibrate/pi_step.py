@@ -48,8 +48,9 @@ not change the board's own period, because it could not restore that period."""
 RATE_SHOWN: Final = "Odometry rate (Hz)"
 """Name in /diagnostics of the rate at which the board sends its ticks.
 
-The value has the form "measured of expected". If the user has not set ``ticks_period``, the driver
-measures the expected rate as well.
+The value has the form "measured of expected". The expected rate comes from ``ticks_period``. If the
+user has not set ``ticks_period``, the driver derives the expected rate from the period that it has
+measured.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""

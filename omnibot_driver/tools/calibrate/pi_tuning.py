@@ -124,7 +124,10 @@ def target_of(plant: Plant, goals: Goals) -> float:
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Return these gains, and their predicted effect on a step to the set-point ``target_of``."""
+    """Return ``gains``, and the predicted effect of these gains on a step of the speed.
+
+    The step leads to the set-point that the function ``target_of`` returns.
+    """
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(

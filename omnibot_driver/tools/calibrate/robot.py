@@ -54,8 +54,9 @@ class Robot(Listener):
         super().__init__(node, context, interruption)
         self._stamped = bool(self.parameters["enable_stamped_cmd_vel"])
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
-        """For each topic and command: number of this node's messages that have not come back yet. A
-        negative number shows a command of another node."""
+        """For each topic and command: number of messages that this node has published, but has not
+        received itself yet. A negative number shows that another node has published this command.
+        """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
             "cmd_vel": TwistStamped if self._stamped else Twist,

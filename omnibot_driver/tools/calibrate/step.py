@@ -77,10 +77,10 @@ def _record(
 def _to_and_fro(
     levels: Sequence[float], arguments: argparse.Namespace, wheel: int = 0
 ) -> tuple[Law, float]:
-    """Return a control law that alternates a wheel between two speeds, and its duration in s.
+    """Return a control law that alternates a wheel between two speeds, and the law's duration in s.
 
-    The steps begin at different phases of the odometry deltas, so that the deltas of all steps
-    together show the whole response.
+    The board sends odometry deltas at a fixed period. Each step begins at another time within this
+    period, so that the deltas of all steps together show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

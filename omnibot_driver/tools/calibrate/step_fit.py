@@ -207,9 +207,9 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The better fit of ``first`` and ``second``, by Akaike's information criterion.
+        """The better of the two fits ``first`` and ``second``, by Akaike's information criterion.
 
-        The models of first and second order assume nothing about the control loop.
+        These two fits assume nothing about the control loop.
         """
         return min(self.first, self.second, key=lambda fit: fit.aic)
 

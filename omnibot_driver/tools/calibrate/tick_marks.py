@@ -99,11 +99,12 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    This error is the median of the mark's errors in all turns, minus the mean of all marks'
-    medians.
-
     * ``rows``: for each record, the relative errors of its times between ticks.
     * ``firsts``: for each record, the number of its first mark.
+
+    All times that begin at the same mark cover the same distance. The distance's error is the
+    median of the errors of these times. The mean of all medians is then subtracted from each
+    median.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

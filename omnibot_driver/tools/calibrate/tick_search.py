@@ -45,12 +45,14 @@ LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered. The
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive times between ticks. If the sum is
-above this limit, and the error of the first time is above half of this limit, the board has missed
-a mark in the first time.
+"""Limit for the sum of the relative errors of two successive times between ticks, A and B. The
+board has missed a mark during A if the sum is above this limit, and the error of A is above half of
+this limit.
 
-* If the board has missed a mark, the sum is about 1, or smaller if its clock loses up to 6 ms.
-* If the board has noticed a mark late, the sum is near 0.
+* If the board has missed a mark, A covers two distances between marks. The sum is then about 1, or
+  smaller if the board's clock loses up to 6 ms.
+* If the board has noticed a mark late, A is too long, and B is too short by the same time. The sum
+  is then near 0.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record that are not searched for missed marks, because the
@@ -87,7 +89,8 @@ def constants(values: Column, order: int) -> tuple[float, float]:
 class Search:
     """A search for the values of a plant.
 
-    ``intervals``: for each record, the times between ticks in s.
+    A mark is a place on the encoder's disc at which the board counts a tick. ``intervals``: for
+    each record, the times between ticks in s.
 
     The array of values has, in this order:
 
@@ -95,7 +98,7 @@ class Search:
     * log of the sum of both time constants (s)
     * ratio of the time constants, if the order is 2
     * for each record, the time from the wheel's start to its first tick (s)
-    * displacements of the marks (ticks), only while they are fitted
+    * offset of each mark from its evenly spaced position (ticks), only while the marks are fitted
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -155,8 +158,8 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        In all later searches, the time between two ticks spans two distances between marks if the
-        board missed the mark between these ticks.
+        If the board missed a mark between two ticks, the time between these ticks covers two
+        distances between marks. All later searches take this into account.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -285,8 +288,9 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the predicted times between ticks in s, record after record.
 
-        ``off``: displacements of the marks. None: use those in ``values``, or those of an earlier
-        fit if ``values`` contains none.
+        ``off``: for each mark on the encoder's disc, the offset from its evenly spaced position, in
+        ticks. If ``off`` is None, the offsets in ``values`` are used. If ``values`` contains no
+        offsets, those of an earlier fit are used.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

@@ -46,8 +46,8 @@ class Behaviour:
 
     ``command_error_s``: integral of the absolute error after a step of the command by 1.
 
-    ``load_error_s``: integral of the absolute error after a step of the load. The step of the load
-    has the effort that turns the wheel at one count per tick.
+    ``load_error_s``: integral of the absolute error after a step of the load. The step is as large
+    as the motor effort that turns the wheel at one count per tick.
 
     ``ms``: peak of the sensitivity; 1 is best.
 

@@ -151,8 +151,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Textual then starts a new thread that reads keys. ``suspend`` first ends the old thread,
-        which would read keys too.
+        The empty ``suspend`` block ends the thread that reads keys. Textual then draws the screen,
+        and starts a new thread that reads keys. Without the block, two threads would read keys.
         """
         with self.suspend():
             pass
