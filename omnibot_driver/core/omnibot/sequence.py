@@ -106,8 +106,8 @@ class Sequence:
     def pause(self) -> None:
         """Record that the board is paused. Its counters may then continue, or restart at zero.
 
-        The duration of the pause is unknown. What the driver supposes if the next delta does not
-        continue the count depends on the poses:
+        The duration of the pause is unknown, so only the next delta can show a restart. If this
+        delta does not continue the count, the driver decides as follows:
 
         * If the board sends poses, the driver supposes a restart even if the new count is high,
           because the first deltas after a restart may be lost. A pose can disprove the restart.
