@@ -119,8 +119,8 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_shor
     only the assumed motion in the gap. If the counters exclude a restart, the robot has driven back
     to the origin, and odom moves there.
 
-    Bug: after a restart, odom moved back to the start of the drive if the robot could have driven
-    there.
+    Regression: after a restart, odom moved back to the start of the drive if the robot could have
+    driven there.
     """
     odometry, estimates = driven(75, 0.016)
     for number in range(90, 140):
@@ -168,7 +168,7 @@ def test_a_disproved_restart_leaves_no_more_uncertainty_than_the_motion_that_was
     The robot has moved by ``lost_m`` unnoticed. ``use_board_pose`` is False, so the poses do not
     correct odom. The covariance covers an error of ``lost_m`` in any direction, and no more.
 
-    Bug: after a wrong suspicion of a restart, the yaw stayed uncertain by 0.3 rad.
+    Regression: after a wrong suspicion of a restart, the yaw stayed uncertain by 0.3 rad.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip(0.7)
     attach(odometry, trip.pose)

@@ -169,8 +169,8 @@ def test_nav2_uses_the_drivers_topics_and_frames() -> None:
 def test_nav2_has_the_behaviours_of_its_default_trees(path: Path) -> None:
     """Nav2's default behaviour trees use three behaviours, so the behaviour server has all of them.
 
-    Bug: the file for a Fejemis lacked the behaviour ``backup``, so bt_navigator could not load its
-    tree, and Nav2 did not start.
+    Regression: the file for a Fejemis lacked the behaviour ``backup``, so bt_navigator could not
+    load its tree, and Nav2 did not start.
     """
     server = load(path.name)["behavior_server"]["ros__parameters"]
     assert {"spin", "wait", "backup"} <= set(server["behavior_plugins"])

@@ -145,7 +145,8 @@ def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: s
 def test_operators_and_observers_may_read_all_commands(file: str) -> None:
     """Tools and recorders also subscribe to the topics that command the robot.
 
-    Bug: under SROS2, monitor, calibrate and `report --live` failed when they subscribed to cmd_vel.
+    Regression: under SROS2, monitor, calibrate and `report --live` failed when they subscribed to
+    cmd_vel.
     """
     every = profiles(POLICY.with_name(f"{file}.policy.xml"))
     driver = allowed(every["/omnibot/driver"])
@@ -161,8 +162,8 @@ def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> N
     that may choose their names freely. So no enclave except those of the driver and the operator
     may answer in the driver's name.
 
-    Bug: under SROS2, no node of these enclaves could start, because the policy allowed the nodes no
-    services.
+    Regression: under SROS2, no node of these enclaves could start, because the policy allowed the
+    nodes no services.
     """
     for path, profile in profiles(POLICY.with_name(f"{file}.policy.xml")).items():
         name = "monitor_1" if path == "/omnibot/operator" else profile.attrib["node"]

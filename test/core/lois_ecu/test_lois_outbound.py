@@ -86,7 +86,7 @@ def test_settings_that_lose_up_to_two_characters_never_command_a_motion(with_sum
     The board expects no checksums. Lines that have a checksum nevertheless are too long for the
     board. The firmware never finds a motion command in the remaining characters.
 
-    Bug: a Stop with a checksum lost two zeros, and commanded 59 % duty to the right wheel.
+    Regression: a Stop with a checksum lost two zeros, and commanded 59 % duty to the right wheel.
     """
     settings = LoisEcuSettings(with_sum=with_sum)
     writer = SettingsWriter(settings, SetPoints(settings))

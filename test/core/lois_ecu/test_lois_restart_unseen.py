@@ -185,7 +185,7 @@ def fast_wheels(steps: list[tuple[int, int]]) -> Translation:
 def test_wheels_that_roll_back_fast_are_no_restart(right: int) -> None:
     """The wheels roll back at 150 RPM, in duty mode. The driver does not take this for a restart.
 
-    Bug: the driver took each decrease of the tick counts that meant more than 110 RPM for a
+    Regression: the driver took each decrease of the tick counts that meant more than 110 RPM for a
     restart. The heading went wrong by radians, and the driver discarded commands.
     """
     slow = [(-FAST_TICKS // 2, right // 2)]

@@ -43,8 +43,8 @@ def test_settings_that_are_written_in_a_drive_keep_the_left_short_correction() -
     This correction is a factor in the measurement of the left wheel's speed. The driver writes the
     settings five times.
 
-    Bug: the fifth time, the driver wrote the mode line last. This line sets the correction to
-    almost 0.
+    Regression: the fifth time, the driver wrote the mode line last. This line sets the correction
+    to almost 0.
     """
     rig = Rig(nominal("firmware"), replace(HOST_GAINS, with_sum=False))
     rig.run(2.0)
@@ -63,7 +63,7 @@ def test_a_lost_line_leaves_no_left_short_correction_of_zero(seed: int) -> None:
     """The left short correction is right after each writing of the settings, even on a bad line.
 
     The line that sets the mode also sets this correction to almost 0, and the driver restores it.
-    Bug: the driver sent only one line to restore it, and this line was often lost.
+    Regression: the driver sent only one line to restore it, and this line was often lost.
     """
     rig = Rig(nominal("firmware", seed), replace(HOST_GAINS, with_sum=False), loss=0.01)
     rig.run(6.0)
@@ -84,7 +84,8 @@ def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firm
     The wheels do not start. While the robot is at rest, the driver writes the mode line with and
     without a checksum. The next drive moves the robot.
 
-    Bug: the driver wrote the mode line only without a checksum, so the board ignored all lines.
+    Regression: the driver wrote the mode line only without a checksum, so the board ignored all
+    lines.
     """
     bench = Bench(firmware, LoisEcuSettings(with_sum=False))
     bench.run(5.0)
@@ -106,7 +107,7 @@ def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
 
     The Stop arrives within half a second after the port is opened, with or without commands.
 
-    Bug: the robot rolled on for seconds, because the board ignored each Stop.
+    Regression: the robot rolled on for seconds, because the board ignored each Stop.
     """
     lois = LoisRobot(firmware)
     board: Any = lois.board

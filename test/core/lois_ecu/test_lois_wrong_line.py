@@ -75,8 +75,9 @@ def test_a_board_without_checksums_is_set_right_although_its_ticks_are_lost() ->
 
     The driver switches the checksums on within ten seconds, and sends a Stop that the board obeys.
 
-    Bug: the driver waited for ticks, so the checksums stayed off, and the board obeyed no Stop. If
-    a Stop lost two characters, the board used the checksum of the Stop as the duty of a wheel.
+    Regression: the driver waited for ticks, so the checksums stayed off, and the board obeyed no
+    Stop. If a Stop lost two characters, the board used the checksum of the Stop as the duty of a
+    wheel.
     """
     _, robot = MAKERS["lois_ecu"]()
     robot.board.receive(b":11000000043e\n")

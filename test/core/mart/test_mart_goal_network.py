@@ -75,7 +75,7 @@ def test_a_goal_that_is_cancelled_in_its_wait_does_not_shorten_the_next_wait() -
     """A move waits up to 2 s while an earlier HELLO (name query) may still reach the server.
 
     If the goal of the move is cancelled during this wait, the wait of the next goal is not shorter.
-    Bug: the limit of 2 s was counted from the first wait.
+    Regression: the limit of 2 s was counted from the first wait.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.3, 0.0, 0.0)

@@ -60,8 +60,8 @@ def test_a_gyro_that_measures_half_of_each_turn_makes_no_turn_seem_late() -> Non
     """The gyro measures half of each turn. After a turn to a goal, the heading is still certain.
 
     The driver requests half of the true angle, but expects a duration that fits the true angle.
-    Bug: the driver expected a duration that fits the requested angle. Each turn to a goal seemed to
-    last long enough for two turns, so the heading was uncertain by more than 2 rad.
+    Regression: the driver expected a duration that fits the requested angle. Each turn to a goal
+    seemed to last long enough for two turns, so the heading was uncertain by more than 2 rad.
     """
     bench = bench_with_poor_gyro("firmware", 0.5)
     here = bench.odometry[-1].pose

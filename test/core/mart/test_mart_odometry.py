@@ -319,7 +319,7 @@ def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
 
     The two true directions differ, so x is uncertain by more than 1 m.
 
-    Bug: the errors of both drives cancelled each other, and x was uncertain by a few mm.
+    Regression: the errors of both drives cancelled each other, and x was uncertain by a few mm.
     """
     doubt = Doubt(MartSettings())
     for step_m in (0.2, -0.2):

@@ -87,7 +87,7 @@ def test_a_robot_that_turned_unheard_has_an_unknown_heading_and_no_more() -> Non
     The direction of this drive is unknown, but the drive ends within 2 m of its start. So x and y
     become uncertain by 1 to 5 m, and no more.
 
-    Bug: the position across the drive was uncertain by 100 m.
+    Regression: the position across the drive was uncertain by 100 m.
     """
     uncertainty = Uncertainty(OdometryNoise())
     uncertainty.miss(10.0, 0.0, 5.0)

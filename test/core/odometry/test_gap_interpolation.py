@@ -191,7 +191,7 @@ def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> No
     Then the robot drives 2 m. Odom shows this drive along x, but its direction is unknown. So the
     position becomes uncertain by 1 to 5 m in x and in y.
 
-    Bug: y became uncertain by 40 m.
+    Regression: y became uncertain by 40 m.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
@@ -210,7 +210,7 @@ def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
     The board restarts again, and odom shows a drive back to the start. The true directions differ,
     so x is uncertain by more than 1 m.
 
-    Bug: the errors of both drives cancelled each other, and x was uncertain by 0.1 m.
+    Regression: the errors of both drives cancelled each other, and x was uncertain by 0.1 m.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))

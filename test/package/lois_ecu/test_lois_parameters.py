@@ -31,7 +31,7 @@ def test_the_description_of_max_wheel_speed_names_every_topic_that_it_limits() -
 def test_what_the_board_keeps_is_unset_by_default() -> None:
     """Settings and periods that the board keeps are unset by default, so nothing is written.
 
-    Bug: the driver wrote periods of 0.2 s by default.
+    Regression: the driver wrote periods of 0.2 s by default.
     """
     values = PARAMETERS.check_all({})
     assert {name: values[name] for name in (*PERIODS, *SETTINGS)} == dict.fromkeys(
