@@ -2,8 +2,8 @@
 
 """Tests of the stall detector, which finds stalls of the pacer, the thread that repeats commands.
 
-In these tests, a command is *refused* if ``outlived_by`` returns False, which means that the
-command may have waited during a stall.
+``outlived_by`` returns False for a command that may have waited during a stall. These tests call
+such a command *refused*.
 """
 
 import pytest

@@ -271,10 +271,11 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Do at most one of three things, if it is due at ``now``.
+        """Do what is due at ``now``, at most one of three things.
 
-        These are: report a pause as confirmed, end a request as failed because its time is over,
-        and send a start again.
+        * Report that a pause is confirmed.
+        * End a request as failed, because the board has not confirmed it in time.
+        * Repeat the start bytes, which the board has not obeyed yet.
         """
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")

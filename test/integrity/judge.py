@@ -21,10 +21,10 @@ read, after the true frame that was found. If the judge must skip too many frame
 decoded frame is wrong.
 """
 REACH_BYTES = 600
-"""Number of received bytes before a read at which the search for the read's frames begins.
+"""Distance in bytes from the start of the search for a frame back from the read with this frame.
 
-The judge searches the stream that was sent. In this stream, the search begins another 300 bytes
-earlier.
+The judge counts the distance in the received bytes. It searches in the sent bytes, and begins there
+300 bytes earlier still.
 """
 
 

@@ -100,7 +100,7 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what a subclass has inferred from earlier reports; a restart makes it invalid."""
+        """Forget what a subclass has inferred from earlier reports. They no longer count."""
 
 
 class TicksGate(Gate[Ticks]):

@@ -33,8 +33,10 @@ speed to the next, in ``duration`` s. After a larger change, the speed is reject
 noticed a tick late, and so has measured a wrong speed."""
 FIRST_RPM: Final = 8.0
 FIRST_PART: Final = 2.0
-"""``FIRST_RPM + FIRST_PART * expected``: largest plausible first speed, in RPM, of a wheel that
-starts."""
+"""Terms of the largest plausible first speed that the board reports of a wheel that starts.
+
+The limit in RPM is FIRST_RPM plus FIRST_PART times the expected speed in RPM.
+"""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported

@@ -71,8 +71,8 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
     """The driver reconnects, and the robot starts backward between the first two odometry reports.
 
-    The driver knows the time from the first of these reports to the second, so the covariance of
-    its estimate stays finite.
+    The driver knows the time between these two reports, so the covariance of the estimated pose
+    stays finite.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.1, 0.1, 0.3, 0.0, 0.0, 0.0, appended=True)

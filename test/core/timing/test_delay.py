@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the sum of all delays from sampling to reading.
+"""Tests of the sum of the delays of all samples, each from sampling to reading.
 
-The board's texts, and the time in which the board is paused, add nothing to this sum.
+The board's texts are no samples, and add nothing to the sum. The time of a pause adds nothing
+either.
 """
 
 import pytest
