@@ -108,7 +108,7 @@ class Encoder:
             case Drive(twist):
                 return self._drive(twist)
             case TurnWheels() | GoTo():
-                raise CommandRefused("command refused: this board accepts only cmd_vel")
+                raise CommandRefused("command rejected: this board accepts only cmd_vel")
             case EmergencyStop():
                 return self.emergency_stop()
         return self.stop()

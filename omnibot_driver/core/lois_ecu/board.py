@@ -238,7 +238,7 @@ class LoisEcuBoard(Board):
             case EmergencyStop():
                 return self.emergency_stop()
             case GoTo():
-                raise CommandRefused("cmd_pose refused: this board has no positional control")
+                raise CommandRefused("cmd_pose rejected: this board has no positional control")
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:

@@ -44,7 +44,7 @@ def command_of(kind: RecordKind, samples: int) -> Command:
     """
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
-            f"record refused: {samples} samples are requested, but the board can complete only 1"
+            f"record rejected: {samples} samples are requested, but the board can complete only 1"
             f" to {MOST_SAMPLES}"
         )
     match kind:
