@@ -203,10 +203,10 @@ class Board(Protocol):
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that follow from elapsed time. Called at ``wake_at``.
+        """Return the readings that are due because time has passed. Called at ``wake_at``.
 
-        The driver regards the board as alive if this method returns a reading. OdometryReadings,
-        NoticeReadings and results of requests are exceptions: they can follow from time alone.
+        OdometryReadings, NoticeReadings and results of requests do not show that the board is
+        alive. After any other reading, the driver regards the board as alive.
         """
         return []
 

@@ -72,12 +72,12 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Restart the wait of ``timeout_s`` without commands that ends a refusal of motion.
+        """Postpone the end of a refusal of motion until ``timeout_s`` from now.
 
-        Only a refusal after the motion monitor's first stop ends in this way. Call this method
-        after a refused command, because the sender of the command is still active. Call this method
-        also after a stall of ``stalled_s`` (s), because commands may have arrived unnoticed. If the
-        wait was already over when the stall began, this method ends the refusal.
+        The refusal ends when no command has come for ``timeout_s`` (s). Only a refusal after the
+        motion monitor's first stop ends in this way. Call this method after a refused command, and
+        after a stall of ``stalled_s`` (s), because commands may have arrived unnoticed during the
+        stall. If the refusal should have ended before the stall, this method ends the refusal.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now

@@ -134,7 +134,7 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """Return the motion order to send to the board. This order never changes."""
+        """Return the motion order to send to the board. The order is the same at all times."""
         return self._order
 
     def check_anew(self) -> None:
@@ -183,7 +183,7 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """Return the motion order to send to the board. This order never changes."""
+        """Return the motion order to send to the board. The order is the same at all times."""
         return self._order
 
     def check_anew(self) -> None:

@@ -29,10 +29,10 @@ AT_LEAST: Final = 2
 A single displacement could be damaged, or come from the time before the wheels began to turn.
 """
 PROOFS: Final = 2.0
-"""Factor for the shortest time in which the driver waits for a proof of a stop.
+"""Factor for the time after which the driver stops waiting for a proof of a stop.
 
-This shortest time is the factor times the duration of the standstill that proves a stop:
-``still_s`` minus ``SLACK_S``.
+This time is the factor times the duration of the standstill that proves a stop (``still_s`` minus
+``SLACK_S``). If displacements are rare, the driver waits longer.
 """
 RAREST_S: Final = 1.0
 """Upper limit, in s, for the assumed period of displacements.

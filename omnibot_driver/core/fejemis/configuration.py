@@ -39,10 +39,11 @@ DIGIT: Final = 6e-4
 The larger one applies, because the board prints few digits.
 """
 HALF: Final = 0.51
-"""Limit for the tolerance of a number that the board reports back, in units of its last digit.
+"""Largest rounding error of a number that the board reports back, in units of its last digit.
 
-The limit is the sum of 0.5 for rounding and 0.01 for single precision. While the number of printed
-digits is unknown, there is no such limit, and the tolerance is that of ``NEAR`` and ``DIGIT``.
+The value is 0.5 for rounding plus 0.01 for single precision. A larger deviation is not accepted,
+even if ``NEAR`` or ``DIGIT`` allows it. While the number of printed digits is unknown, only
+``NEAR`` and ``DIGIT`` apply.
 """
 
 

@@ -51,8 +51,10 @@ MARKED_S: Final = PERIOD_S
 arrives between these two. They then probably belong to different samples.
 """
 PATIENCE: Final = 60
-"""Number of intervals after which ``ImuPairs`` decides which line of a sample comes first, even if
-the magnitude of ``_evidence_s`` is still below ``KNOWN_S``.
+"""Limit for the number of measured intervals between a gyro line and an acceleration line.
+
+At this limit, ``ImuPairs`` decides which line of a sample comes first, even if the magnitude of
+``_evidence_s`` is still below ``KNOWN_S``.
 """
 MOST: Final = 10
 """Limit for the magnitude of each counter in ``_outside``. At this limit, a counter stops.
@@ -60,10 +62,10 @@ MOST: Final = 10
 The sign of a counter shows whether a kind of line comes between pairs or within a pair.
 """
 UNPOSED: Final = 20
-"""Limit for the number of gyro or acceleration lines for which a doubtful pair waits for a pose.
+"""Limit for the number of gyro lines, and of acceleration lines, since the last pose.
 
-If more gyro lines, or more acceleration lines, have arrived since the last pose, the pair is
-rejected.
+If one of the two numbers is above this limit, the driver rejects a doubtful pair instead of waiting
+for the next pose.
 """
 
 
@@ -116,8 +118,9 @@ class ImuPairs:
         self._between: set[str] = set()
         """The kinds of lines that arrived since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """A counter for each kind of line, except gyro and acceleration lines. Lines between two
-        pairs increase the counter, and lines within a pair decrease it."""
+        """For each kind of line, except gyro and acceleration lines: a counter that shows where
+        lines of this kind usually come. The counter is positive if they come between two pairs of a
+        gyro and an acceleration line, and negative if they come within a pair."""
         self._skipped = 0
         self._silent = False
         """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines.

@@ -79,8 +79,8 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line for a speed in m/s and a turn rate in rad/s.
 
-    The board drives the outer wheel with the speed sqrt(speed² + turn rate²), in m/s. The sign of
-    ``speed_mps`` gives the direction of the outer wheel.
+    The board's formula ignores the different units: the speed of the outer wheel, in m/s, is
+    sqrt(speed² + turn rate²). The sign of ``speed_mps`` gives the direction of the outer wheel.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:

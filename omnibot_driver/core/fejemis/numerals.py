@@ -14,7 +14,7 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: powers of ten that limit the size of a safe number.
+"""``SMALLEST``, ``LARGEST``: exponents of ten that limit the size of a safe number.
 
 A safe number is at least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``. The checksum of a
 line with safe numbers detects the loss of any two characters.

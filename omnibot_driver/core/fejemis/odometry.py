@@ -14,9 +14,10 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects.
+"""Factor by which the driver corrects the wheels' motion towards a new pose.
 
-This applies to a difference that rounding of the pose can explain.
+The correction is this factor times the difference between the wheels' motion and the way to the
+pose. The factor applies if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
@@ -55,17 +56,17 @@ AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
 """``AGAIN_M``, ``AGAIN_RAD``: tolerances, in m and rad, between poses and the wheels' motion.
 
-With these tolerances, the driver decides whether the origin may have moved again between two
-rejected poses. Two conditions must be true. First, the motion from the first to the second pose
-differs from the wheels' motion by more than a tolerance. Second, the way from the origin to the
-second pose is at most as long as the wheels' motion plus the tolerances.
+Between two rejected poses, the board may have moved the origin of its poses to the robot. The
+driver assumes this if two conditions are true. First, the motion from the first to the second pose
+differs from the wheels' motion by more than a tolerance. Second, distance and angle from zero to
+the second pose are at most those of the wheels' motion plus the tolerances.
 """
 LONGEST_JUMP_S: Final = 0.2
 """Longest time, in s, for which the driver trusts the wheel speeds more than the poses.
 
 The time begins with the last accepted pose. In this time, the driver rejects poses that contradict
-the wheel speeds, because the origin of the poses may be moving again and again. After this time,
-the driver trusts the poses, not the wheel speeds.
+the wheel speeds, because another program may repeatedly reset the board's pose to zero (``enc0``).
+After this time, the driver trusts the poses, not the wheel speeds.
 """
 
 

@@ -76,7 +76,8 @@ class Ports:
     def identify(self) -> bool:
         """Find out which board is at which port. Call this after a heartbeat.
 
-        Return whether the known order of the boards has changed.
+        Return whether the two boards have exchanged their ports since both boards were last known.
+        Before that, the drive board is expected at the first port.
         """
         first, second = (half.role for half in self.halves)
         if first == second:

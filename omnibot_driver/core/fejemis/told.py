@@ -2,7 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-A notice that stops the robot is passed on each time, but a repeated one has an empty text.
+Some notices make the driver stop the robot. The driver gets such a notice each time, but with an
+empty text if the user has seen the text in the last 10 s.
 """
 
 import math
