@@ -83,10 +83,10 @@ a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""The error that remains after a large correction of the distance of a wheel without counted ticks.
+"""Factor for the error that remains after a report has corrected a wheel's distance.
 
-A correction is large if it exceeds ``CORRECTED_TICKS``, in ticks. The standard deviation of the
-error is the fraction ``CORRECTED_PART`` of the excess over ``CORRECTED_TICKS``.
+The standard deviation of the error is the factor times the part of the correction above
+``CORRECTED_TICKS`` (in ticks). Only for a wheel without counted ticks.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance

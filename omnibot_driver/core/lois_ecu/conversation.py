@@ -208,7 +208,8 @@ class LoisConversation:
     def figures(self) -> BoardFigures:
         """Counters and rates for diagnostics. The counters continue after a reconnection.
 
-        If the user has set no period of the ticks, the measured period gives the expected rate.
+        The expected odometry rate follows from the period of the tick reports that the user has
+        set, or else from the measured period.
         """
         ticks_ms = self._settings.periods_ms.get(
             Stream.TICKS, 1e3 * self._upkeep.writer.ticks_period_s

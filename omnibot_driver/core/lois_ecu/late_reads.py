@@ -28,7 +28,7 @@ an inexact clock rate could make the corrected times fall more and more behind t
 
 @value(frozen=True, slots=True)
 class Heard:
-    """A tick report, when it arrived, and its corrected time, both in s."""
+    """A tick report with its arrival time and its corrected time, both in s."""
 
     ticks: Ticks
     arrived_s: float

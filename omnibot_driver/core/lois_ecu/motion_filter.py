@@ -77,7 +77,7 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest expected difference, in m/s, between the wheel speeds that the board measures.
+        """Smallest estimated difference (m/s) between the two wheel speeds measured by the board.
 
         The value covers the time since the board's distance was last compared with the estimated
         distance. While both speeds are equal, the public firmware does not update its position. So

@@ -53,9 +53,9 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether the time of the odometry is still that of the last estimate. The wheels'
-        ``blind`` flags mark motion without counted ticks. The driver sets these flags to False when
-        time passes. Until then, an odometry report in the same read can still correct this motion.
+        """Whether an estimate has been made since the odometry's time last advanced. If True, the
+        next advance sets the wheels' ``blind`` flags (motion without counted ticks) to False. The
+        flags stay until then: an odometry report in the same read can still correct the motion.
         """
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
@@ -108,7 +108,7 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """For each wheel: True if it is commanded backward, and is assumed to be at rest."""
+        """For each wheel: whether it is assumed to be at rest, although commanded backward."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 

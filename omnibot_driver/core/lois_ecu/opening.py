@@ -57,21 +57,22 @@ fraction of the set period. Within it, the set period is confirmed."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two calls of ``ask_date`` that request the GPS date."""
 TICKS_DUE_S: Final = 1.5
-"""Longest wait for ticks, in s since the last ticks. When the driver has written a long period of
-the ticks, it writes the period again only after ticks have come, or after this wait."""
+"""Longest wait for a tick report, in s since the last one. After the driver has written a long
+period of the tick reports, it writes the period again only after a tick report or this wait."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
 boot, which takes two seconds."""
 UNANSWERED_S: Final = 5.0
-"""Time in s after which the driver restores the board's mode if no date has arrived, although the
-board sends reports. After the first ``ROUNDS`` rounds, the driver writes the settings again only
-when ticks arrive, and on a bad line, too few ticks may arrive."""
+"""Time in s without the requested GPS date after which the driver restores the board's mode. If the
+board sends reports but no date, it may not obey requests. Writing the settings again may not help:
+after ``ROUNDS`` rounds, the driver does so only when tick reports arrive, and a bad line may lose
+these reports."""
 RESYNC: Final = b"::"
-"""Characters between a line with a checksum and the next line, which has none. A board that expects
-no checksums keeps the surplus end of the first line, until a ``:`` begins a new line. Without these
-extra colons, the loss of two characters (the ``:`` of the second line, and one more) could make a
-motion command of the surplus end and the second line."""
+"""Two extra colons between a line with a checksum and a line without. A board that expects no
+checksums stores the surplus characters of the first line until the next ``:``. If the ``:`` of the
+second line and one more character were lost, the stored characters and the second line could form
+a motion command. The extra colons prevent this."""
 
 
 class SettingsWriter:
@@ -309,13 +310,13 @@ class SettingsWriter:
         self._round_at_s = max(self._round_at_s, at_s)
 
     def _writes_ticks(self, now: float) -> bool:
-        """Return whether the round of settings that begins now writes the period of the ticks.
+        """Return whether the round of settings that begins now writes the tick reports' period.
 
-        Each write restarts the period on the board, so the next ticks come later. If each round
-        wrote a long period, no ticks might come until the rounds are over. So the driver writes a
-        long period again only after ticks have come, or after ``TICKS_DUE_S`` without ticks. After
-        ``ROUNDS`` rounds, only every third round writes a period of the ticks, because only ticks
-        at undisturbed intervals can confirm the period.
+        Each write restarts the period on the board, so the next tick report comes later. If each
+        round wrote a long period, no tick report might come until the rounds are over. So the
+        driver writes a long period again only after a tick report, or after ``TICKS_DUE_S`` without
+        tick reports. After ``ROUNDS`` rounds, only every third round writes the period, because
+        only tick reports at undisturbed intervals can confirm the period.
         """
         awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S
         return not (awaited and slow_ticks(self.settings)) and (

@@ -218,8 +218,8 @@ class ReportedSpeed:
     def _doubt_rolling(self, chance: float) -> None:
         """Add an error to the distance of a wheel that is estimated as rolling, but may be at rest.
 
-        The standard deviation becomes ``chance`` times the distance since the reported speed last
-        changed. The board's odometry (0x20) does not show this error.
+        In total, the standard deviation of the added errors is ``chance`` times the distance since
+        the reported speed last changed. The board's odometry (0x20) does not show these errors.
 
         ``chance``: probability that the wheel is at rest.
         """

@@ -21,9 +21,9 @@ JUMP_TICKS: Final = 3
 ``JUMP_TICKS`` ticks. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""Smallest count of a robot at rest whose fall to zero proves a reset: ``STEADY_TURNS`` turns of a
-wheel, plus ``STEADY_TICKS`` ticks. After the reset, the counts of both wheels must be zero.
-Backlash changes a count by less than this limit."""
+"""Limit for the tick counts of a robot at rest: ``STEADY_TURNS`` turns of a wheel, plus
+``STEADY_TICKS`` ticks. If a count was at least this limit, and the counts of both wheels are zero
+now, the board has obeyed a reset. Backlash changes a count by less than this limit."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""
@@ -48,19 +48,19 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver sends the reset again.
 
-        ``before``: the last tick counts before this repetition. If the wheels are at rest
-        (``steady``), and a fall of these counts to zero would prove a reset, the proof uses them
-        instead of earlier counts.
+        ``before``: the last tick counts before this repetition. The proof uses ``before`` instead
+        of earlier counts if the wheels are at rest (``steady`` is True), and a fall of ``before``
+        to zero would prove a reset.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the driver can report the result of the reset now.
+        """Return whether the driver can report the reset as done.
 
-        The result is True if the counts ``ticks`` are near zero, and prove the reset. From
-        ``UNPROVED_S`` after the first call, counts near zero are enough.
+        This is so if the counts ``ticks`` are near zero, and prove the reset. From ``UNPROVED_S``
+        after the first call, counts near zero are enough.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -20,8 +20,8 @@ CLEAR_AFTER_S: Final = 2.0
 """Shortest time in s from a Stop until RPM 0/0 is sent. Until then, the tick counts can show the
 standstill; RPM 0/0 ends the counting."""
 CLEAR_AFTER_TICKS: Final = 6
-"""Shortest time from a Stop until RPM 0/0 is sent, in periods of the tick reports. The longer the
-period, the longer the proof of the standstill takes."""
+"""Shortest time from a Stop until RPM 0/0 is sent, in periods of the tick reports. Until
+then, these reports can show the standstill; RPM 0/0 ends the counting of ticks."""
 CLEAR_AGAIN_S: Final = 0.15
 
 

@@ -23,18 +23,18 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
-"""Longest period of the ticks, in ms, that each of the first ``ROUNDS`` rounds of settings writes.
-Each write restarts the period on the board, and so delays the next ticks. With this period, the
-rounds delay the ticks by less than 1 s. A longer period is written in fewer rounds."""
+"""Limit, in ms, for the period of the tick reports. Each of the first ``ROUNDS`` rounds of settings
+writes a period up to this limit; fewer rounds write a longer period. Each write restarts the period
+on the board. Up to this limit, the writes delay the next tick report by less than 1 s."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the left short correction in the public firmware after a boot."""
 
 
 def slow_ticks(settings: LoisEcuSettings) -> bool:
-    """Return whether the period of the ticks is too long to be written in each round of settings.
+    """Return whether the tick reports' period is too long to be written in each settings round.
 
     Each write restarts the period on the board. If each of five rounds wrote a long period, the
-    board might send no ticks for 1 s or more.
+    board might send no tick report for 1 s or more.
     """
     return settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
 
@@ -48,7 +48,7 @@ def dates_come_periodically(settings: LoisEcuSettings) -> bool:
 
 
 def sets_ticks(command: Command) -> bool:
-    """Return whether ``command`` sets the period of the ticks."""
+    """Return whether ``command`` sets the period of the tick reports."""
     return isinstance(command, SetPeriod) and command.stream is Stream.TICKS
 
 
@@ -72,7 +72,7 @@ def round_commands(
     The request for a date comes last: the board answers at once, and would miss the next line.
 
     * ``number``: number of the round, from 1.
-    * ``ticks``: whether the round writes the period of the ticks.
+    * ``ticks``: whether the round writes the period of the tick reports.
     * ``correction``: whether the left short correction may have been overwritten.
     * ``date``: whether the round requests a date.
     """
@@ -101,7 +101,7 @@ def _writes(settings: LoisEcuSettings, *, ticks: bool, correction: bool) -> Iter
 
 
 def _repeating(commands: Iterable[Command], settings: LoisEcuSettings) -> Iterator[Command]:
-    """Yield ``commands``. A command that sets a long period of the ticks is yielded twice.
+    """Yield ``commands``. A command for a long period of the tick reports is yielded twice.
 
     Few rounds of settings write a long period, and the board may lose a single line.
     """

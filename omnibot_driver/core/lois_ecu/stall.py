@@ -38,7 +38,7 @@ AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
 """``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion that show a
 stalled wheel, after a forward or a backward command. While a wheel rolls steadily backward, the
-board can report the same speed a few times."""
+board can report the same speed a few times, and the driver may see no motion in these reports."""
 
 
 class StallWatch:

@@ -41,9 +41,8 @@ NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 CONTRADICTED_S: Final = 1.0
 """Longest time in s in which wheels are assumed to roll back between two tick reports.
 
-The driver computes from the time between two reports how far the wheels may have rolled back. If
-the driver knew the unit of the board's clock before the new report, but does not know the unit
-after this report, the driver uses at most this limit as the time.
+The limit applies if the second report makes the unit of the board's clock unknown. Otherwise, the
+driver assumes that the wheels may roll back in the whole time between the reports.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.
