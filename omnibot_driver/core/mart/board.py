@@ -238,7 +238,7 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server's heading is exactly zero, as before its first RM (forward drive).
 
-        After the first RM, the server's clock must not be set back: RM integrates the turn rate
-        over the time since the previous RM.
+        If not, the driver must not set back the server's clock: RM integrates the turn rate over
+        the time since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero

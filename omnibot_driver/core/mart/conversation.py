@@ -129,8 +129,8 @@ class Conversation(LateReplies):
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now. Every command waits while a request is pending.
 
-        A query that is not urgent (PRESSING) also waits while a late reply to an earlier request
-        could be mistaken for the reply to ``word``.
+        A query that is not in PRESSING (the urgent queries) also waits while a late reply to an
+        earlier request could be mistaken for the reply to ``word``.
         """
         if self.pending is not None:
             return False

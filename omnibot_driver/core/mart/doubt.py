@@ -45,9 +45,9 @@ standard deviation by the angle in rad.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Random error of a turn that is computed from the commands, as a fraction of its constant error.
+"""Random error of a turn that is computed from the commands, as a fraction of its systematic error.
 
-Both errors are standard deviations. The constant error has the same sign in all intervals between
+Both errors are standard deviations. The systematic error has the same sign in all intervals between
 two encoder counts; the random error is independent in each interval.
 """
 SPREAD: Final = 0.3
@@ -122,16 +122,15 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the constant heading error at the beginning of a motion.
+        """Store the systematic heading error at the beginning of a motion.
 
-        The constant heading error grows while the driver computes a turn from the commands. If the
-        server reports the heading during the motion, ``heading_told`` sets the error back to the
-        stored value.
+        This error grows while the driver computes a turn from the commands. If the server reports
+        the heading during the motion, ``heading_told`` restores the stored value.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the constant heading error of this motion, because the server reports the heading.
+        """Remove this motion's systematic heading error, because the server reports the heading.
 
         The random heading error and the position error stay.
         """
@@ -202,9 +201,9 @@ def _by_gyro(told_rad: float) -> float:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors of x and y (``way_m``), and of the heading (``turn_rad``).
+    """Return the variances and directions of independent errors of x, y and heading.
 
-    The arguments are standard deviations.
+    ``way_m``, ``turn_rad``: standard deviations of x and of y (m), and of the heading (rad).
     """
     return _around(way_m * way_m, turn_rad * turn_rad)
 

@@ -61,8 +61,8 @@ class Health:
       heading.
     * ``heading_changes``: number of changes of the reported heading in the current motion.
     * ``reference_fails``: number of starts of RM in a row that have failed.
-    * ``outlived``: whether the server answered a stop only after the use of the stop port, so that
-      the stop of the next motion can fail.
+    * ``outlived``: whether the server's stop port may still wait for the end of an old motion. The
+      stop of the next motion can then fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -146,10 +146,10 @@ class Health:
             self.status = bits
 
     def outlives(self) -> None:
-        """Record that the stop port of the server may hang during the next motion.
+        """Record that the server's stop port may still wait for the end of an old motion.
 
-        The driver used the stop port to end a motion, and the server answered an earlier stop only
-        after that. So the stop port may still wait for the end of that motion.
+        The server answered a stop command after the driver had also used the stop port for the same
+        motion. The stop port may hang during the next motion.
         """
         self.outlived, self._may_be_restarted = True, False
 

@@ -30,8 +30,8 @@ equally. So when the reply arrives, the age of the result is half of the time by
 took longer than usual.
 """
 EARLY: Final = 4
-"""Limit for the number of checks of the IMU in a row whose only reply comes too early for a check.
-At this number, the driver tells the user that the server answers too fast."""
+"""Number of failed checks of the IMU in a row after which the driver tells the user that the server
+answers too fast. Each of these checks gets only a reply that comes too early."""
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0

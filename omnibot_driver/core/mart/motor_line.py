@@ -75,7 +75,7 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Lower the offset to give no speed at ``units``, because the motor has not turned.
+        """Lower the offset until the speed at ``units`` is zero, because the motor has not turned.
 
         An obstacle may be the cause, so the offset becomes as uncertain as at the beginning.
         """
@@ -114,9 +114,9 @@ class MotorLine:
         self.offset = min(0.0, max(-MOST_DEAD * self.slope, offset))
 
     def speed(self, units: float) -> float:
-        """Return the speed at ``units``, in nominal units.
+        """Return the motor's speed, in nominal units, for the motor units ``units``.
 
-        A negative speed means that the motor does not turn.
+        The value is negative if ``units`` are too few for the motor to turn.
         """
         return self.slope * units + self.offset
 
