@@ -51,7 +51,7 @@ class Conductor:
             way_m = self._pilot.odometry.pose.way_to(order.place).way_m
             if not way_m <= FARTHEST_M:
                 raise CommandRefused(
-                    f"cmd_pose refused: the goal is {way_m:g} m away, but the limit is"
+                    f"cmd_pose rejected: the goal is {way_m:g} m away, but the limit is"
                     f" {FARTHEST_M:g} m; choose a nearer goal"
                 )
             return False

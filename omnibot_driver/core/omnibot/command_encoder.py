@@ -126,14 +126,14 @@ class CommandEncoder:
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)
         if not all(abs(count) < MAX_WORD + 0.5 for count in counts):
             raise CommandRefused(
-                f"cmd_pose refused: in the board's own frame the goal is x {pose.x_m:.2f} m, y"
+                f"cmd_pose rejected: in the board's own frame the goal is x {pose.x_m:.2f} m, y"
                 f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad, but the limits are"
                 f" {MAX_WORD / position:.2f} m and {MAX_WORD / heading:.2f} rad; call ~/reset to"
                 " begin a new frame at the robot's position"
             )
         if any(map(begins_with_a_letter, nearest(*counts))):
             raise CommandRefused(
-                f"cmd_pose refused: the goal (in the board's own frame: x {pose.x_m:.2f} m, y"
+                f"cmd_pose rejected: the goal (in the board's own frame: x {pose.x_m:.2f} m, y"
                 f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad) contains a byte that the board"
                 " could mistake for a start, pause or reset if the line loses bytes; choose"
                 " another goal, or call ~/reset to begin a new frame at the robot's position"

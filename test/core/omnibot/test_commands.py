@@ -141,7 +141,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A goal beyond 32.77 m or rad, the limit of a 16-bit word, is refused.
+    """A goal beyond 32.77 m or rad, the limit of a 16-bit word, is rejected.
 
     With limited values, the robot would drive to another place.
     """
