@@ -132,7 +132,7 @@ def _typed(
     """Return the changed parameters, each in its declared type.
 
     An integer for a floating-point parameter becomes a float, because code that reads this
-    parameter expects a double. A wrong value is returned unchanged; ``_check`` refuses it.
+    parameter expects a double. A wrong value is returned unchanged; ``_check`` rejects it.
     """
     return [_in_own_type(table, item) for item in changed]
 

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls at which the queue is full. A thread that calls ``deliver`` then waits
-until another thread has made the queued calls."""
+"""Number of queued calls at which the queue is full. While the queue is full, ``deliver`` waits for
+the thread that is making the queued calls."""
 
 Delivery = Callable[[], object]
 

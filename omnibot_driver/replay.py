@@ -33,9 +33,10 @@ class Replay:
     """One session on one recording, which is played once.
 
     * ``deliver``: receives events, and the time of day in ns at the session's time 0.
-    * ``failed``: receives the exception that ended the thread, which is always a bug.
+    * ``failed``: receives the exception that ended the playback thread, which is always a bug.
 
-    The function arguments, except ``failed``, are called one at a time, in the order of the events.
+    The replay calls ``deliver``, ``report`` and ``refused`` one at a time, in the order of the
+    events.
     """
 
     def __init__(

@@ -81,8 +81,8 @@ class Services:
             return response
         if active and state != DISCONNECTED and self._link.blocked:
             response.message = (
-                "e-stop latched; port is not accepting data; the stop will be sent when the port is"
-                " open again"
+                "e-stop latched; the port is not accepting data; the driver will open the port"
+                " again and then send the stop"
             )
         response.success = True
         return response

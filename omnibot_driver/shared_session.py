@@ -58,9 +58,11 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the link wrote its last Stop to every line. If the link first had to open a lost
-        port again, the value is True only if a proof of a standstill was still missing
-        (``Shutdown.owed``)."""
+        """Whether the link wrote its last Stop to every line.
+
+        If the port was lost, the reader opens it again to write Stop. The value then stays False if
+        the robot was already proved to stand still (``Shutdown.owed`` is False).
+        """
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
         line, and measurements showed the robot at rest after the last motion command."""

@@ -119,7 +119,9 @@ class PausedReading:
 
 @value(frozen=True, slots=True)
 class OdometryReading:
-    """The board's own odometry, in a frame whose origin ``Board.reset_odometry`` moves.
+    """The board's own odometry.
+
+    ``Board.reset_odometry`` moves the origin of the odometry's frame.
 
     * ``stamp_s``: time of measurement, in s of the host's steady clock.
     * ``twist``: in the board's body axes.

@@ -15,7 +15,7 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.requests import OnExit
 
 LAST_STOPS: Final = 3
-"""Number of copies of Stop sent at once before the port is closed, because one can be lost."""
+"""Number of Stop frames sent in a row before the port is closed, because one can be lost."""
 
 
 class Shutdown:

@@ -42,12 +42,11 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s since the last voltage query (VOLTS) for which unanswered requests delay the
-next VOLTS.
+"""Limit of the delay of the voltage query (VOLTS), in s after the last VOLTS.
 
-In the first STARTS_UP_S (s) after a motion, unanswered requests delay VOLTS even after this time.
-The motion may have been a long turn on the spot, in which the driver sends no VOLTS (see
-``_may_ask_volts``).
+Unanswered requests delay VOLTS, but not beyond this limit. In the first STARTS_UP_S (s) after a
+motion, the delay may be longer: the motion may have been a long turn on the spot, in which the
+driver sends no VOLTS (see ``_may_ask_volts``).
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -104,11 +103,11 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is busy, so that the driver does not expect a reply.
+        """Return whether the driver expects the server to be silent, because the server is busy.
 
-        The result is False if the server had already been silent for some time when the driver
-        began to stop a motion: the server may be lost. This rule does not apply to a controlled
-        move, in which every server is silent.
+        The result is False if the server may be lost, because the server had been silent for too
+        long (``_absent_s``) when the driver began to stop a motion. A controlled move is an
+        exception, because every server is silent during such a move.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
@@ -232,9 +231,9 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        Two replies exclude the duplicate, because the server is silent during a move: an encoder
-        count that the server measured after the end of the move, and the answer to a HELLO that the
-        driver sent after the start of the move.
+        The server is silent during a move. So either of two replies excludes a duplicate: an
+        encoder count that the server measured after the end of the move, or the answer to a HELLO
+        that the driver sent after the start of the move.
         """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free

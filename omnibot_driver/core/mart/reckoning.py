@@ -254,7 +254,10 @@ class Reckoning(CorrectedPose):
         return wheel_m, self._rim_rad(wheel_m)
 
     def _rim_rad(self, wheel_m: float) -> float:
-        """Convert a wheel's distance in m to a turn in rad; zero except in a turn on the spot."""
+        """Return the robot's turn in rad for a distance of the right wheel in m.
+
+        The turn is zero in all motions except a turn on the spot.
+        """
         return 2 * wheel_m / self._settings.track_m if self.on_the_spot else 0.0
 
     @property

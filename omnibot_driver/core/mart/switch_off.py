@@ -94,7 +94,7 @@ class SwitchOff:
         self.underway = True
 
     def answered(self, word: Word, reply: Ok | Fail) -> None:
-        """Evaluate the reply to MCS (motors off) or to MSM (motions allowed again).
+        """Evaluate the reply to MCS (direct control of the motors) or MSM (end of this control).
 
         The failure CONFLICT shows that an earlier MCS has arrived and is in progress.
         """

@@ -54,9 +54,9 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: a count that may be from before the start command or from after it; 0 if there is
-    none. It is the last reported count if it differs by at most 1 from the last count before the
-    command: the network may have lost the command.
+    ``maybe``: the last reported count, while this count may be from before the start command; else
+    0. The count may be from before the command if it differs by at most 1 from the last count
+    before the command: if the network lost the command, the server did not reset the count.
     """
 
     def __init__(self) -> None:

@@ -30,18 +30,20 @@ Stamped = tuple[Reading, float]
 STILL: Final = 0.08
 """Limit by which the filter recognises spikes of the IMU, as a fraction of a change.
 
-* A change of a reading is a spike only if the next reading returns to the reading before the
-  change. It may differ from that reading by at most this fraction of the change.
-* A change of one value is the flip of a bit only if all other values of the reading have changed by
-  at most this fraction of it.
+* A change is a spike only if the next reading returns to the reading before the change. The two
+  readings may differ by at most this fraction of the change.
+* A change of one value is the flip of a bit only if every other value of the reading has changed by
+  at most this fraction of the one value's change.
 """
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
 changed implausibly much. The others are the poses after it."""
 ALIKE: Final = 1.1
-"""Largest ratio between the durations of two successive displacements. If the ratio is larger, e.g.
-because a line between them was lost, the filter does not compare the two displacements. Otherwise,
-even a steady motion would look like a change."""
+"""Largest ratio between the durations of two successive displacements that the filter compares.
+
+The ratio is larger, for example, if the board's message between the two displacements was lost. If
+the filter compared them, even a steady motion would look like a change.
+"""
 BACK: Final = 0.25
 """Limit by which the filter recognises spikes of displacements, as a fraction of a change.
 

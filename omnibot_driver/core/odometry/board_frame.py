@@ -73,10 +73,9 @@ class BoardFrame:
 
         ``told``: the pose that the board reports.
 
-        ``before``: the robot's pose before the displacements that wait for a pose. The caller has
-        computed it from ``told``, the pose after these displacements.
+        ``before``: ``told`` minus the displacements that wait for a pose.
 
-        ``confirmed``: whether ``told`` agrees with the last doubted pose.
+        ``confirmed``: whether ``told`` agrees with the last unexpected pose of the board.
 
         ``reachable``: whether the robot can have reached ``told`` without a restart.
 

@@ -140,12 +140,13 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 
 
 class Astray:
-    """Position errors of an uncertain heading that are not proportional to the heading's error.
+    """Two errors of the position that grow with the variance of the heading.
 
-    There are two such errors: one along the motion, and one across it. The standard deviation of
-    each error is a fraction of the driven distance. This fraction is ``ASTRAY`` times the variance
-    of the heading, but at most 1. While this variance does not grow, all motions have the same
-    relative error. So a way back then cancels the errors of the way out.
+    Other code adds the position error that is proportional to the heading's error. This class adds
+    one error along the motion, and one across it. The standard deviation of each error is a
+    fraction of the driven distance: ``ASTRAY`` times the variance of the heading, but at most 1.
+    While this variance does not grow, all motions have the same relative error, so a way back
+    cancels the errors of the way out.
 
     ``m2``: variance of x and of y, in m².
     """
@@ -153,17 +154,17 @@ class Astray:
     def __init__(self) -> None:
         self.m2 = 0.0
         self._along_m = (0.0, 0.0)
-        """Covariances of x and y with the present error of the direction, in m.
+        """Covariances of x and y with the relative error of the last displacement, in m.
 
-        The error of the direction is scaled to a random number with variance 1.
+        The relative error is scaled to variance 1.
         """
         self._rad2 = 0.0
 
     def move(self, dx_m: float, dy_m: float, rad2: float) -> None:
         """Add the errors of a displacement in the odometry frame.
 
-        ``rad2``: variance of the heading. The larger this variance is than at the previous call,
-        the less the new errors depend on the earlier ones.
+        ``rad2``: variance of the heading. If this variance has grown since the previous call, the
+        new errors depend less on the earlier errors.
         """
         kept = min(1.0, self._rad2 / rad2)
         part = min(1.0, ASTRAY * rad2)
@@ -259,10 +260,10 @@ class Uncertainty:
         self.gap = self._halt = NOTHING
 
     def bound(self, way_m: float, turn_rad: float) -> None:
-        """Replace the uncertainty of all gaps by the error that the gaps have caused.
+        """Set the uncertainty of all gaps to the error that the gaps have caused.
 
-        ``way_m``, ``turn_rad``: this error in m and rad. A pose of the board has shown it, but the
-        settings do not allow a correction.
+        ``way_m``, ``turn_rad``: this error in m and rad. A pose of the board has shown the error,
+        but the settings do not allow a correction.
         """
         self.gap = Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
         self._halt = NOTHING

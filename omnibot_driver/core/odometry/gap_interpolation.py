@@ -29,9 +29,8 @@ class GapInterpolation:
     * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
       If only poses arrive, ``last`` is the motion between two accepted poses, divided by the number
       of lost displacements.
-    * ``missing``: number of displacements that were lost after the last displacement or accepted
-      pose, as far as poses have shown the loss. The odometry assumes for each of them the motion
-      ``last``.
+    * ``missing``: number of lost displacements that poses have shown since the last displacement
+      or accepted pose. The odometry assumes the motion ``last`` for each of them.
     """
 
     def __init__(self) -> None:
@@ -84,11 +83,11 @@ class GapInterpolation:
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted.
 
-        ``way``: error of the assumed motion, as a tangent in body axes. It is the motion from the
-        previous accepted pose to this pose, minus the motion that was assumed for it.
+        ``way``: error of the assumed motion, as a tangent in body axes. The error is the motion
+        from the previous accepted pose to this pose, minus the motion that was assumed instead.
 
-        If all displacements since the previous accepted pose were lost, ``last``, the motion that
-        is assumed for each of them, becomes the mean motion per lost displacement.
+        If all displacements since the previous accepted pose were lost, the mean motion per lost
+        displacement becomes ``last``, the motion that is assumed for the next lost displacements.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last

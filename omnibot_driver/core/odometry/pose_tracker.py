@@ -118,10 +118,10 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def bound(self, tangent: Pose) -> None:
-        """Replace the uncertainty of all gaps until now by the error that the gaps have caused.
+        """Set the uncertainty of all gaps until now to the error that the gaps have caused.
 
-        ``tangent``: this error. A pose of the board has shown the error. The error stays in the
-        odometry, because the settings do not allow a correction.
+        ``tangent``: this error. A pose of the board has shown the error, but the settings do not
+        allow a correction.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)

@@ -125,10 +125,10 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """How far the stream of IMU frames had arrived when the last read ended; None if unknown.
+        """The place in the stream of IMU frames at which the last read ended; None if unknown.
 
-        If the last bytes of the read are the beginning of an IMU frame, the value describes a read
-        that ended within this frame.
+        If the last bytes of the read are the beginning of an IMU frame, the place is within this
+        frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)

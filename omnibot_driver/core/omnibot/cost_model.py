@@ -62,8 +62,8 @@ GAP: Final = 5.0
 """Cost of a frame whose bytes arrived with a pause between them: the board does not interrupt a
 frame."""
 BAD_TEXT: Final = 4.0
-"""Cost of a complete «Paused» text within unexplained bytes. Its nine fixed bytes hardly arise by
-chance."""
+"""Cost of a complete «Paused» text within unexplained bytes. The cost is high, because the nine
+fixed bytes of this text hardly arise by chance."""
 KNOWN_GAP: Final = 11.0
 """Cost of a frame that contains a pause, on a line that has paused only between frames so far.
 

@@ -58,10 +58,11 @@ class Walk:
     No evidence speaks against these frames.
 
     * ``ends``: the position in the bytes after each frame.
-    * ``lessons``: IMU frames from which the usual scatter is learned. Each entry: number of frames
-      before the IMU frame, the IMU frame itself, and the previous IMU frame.
-    * ``known``: what the decoder knows from earlier frames, at some places in the row of frames.
-      Each entry: number of frames before the place, and the fields of ``Context`` at the place.
+    * ``lessons``: IMU frames from which the decoder learns the usual scatter of the IMU's values.
+      Each entry: number of frames before the IMU frame, the IMU frame itself, and the previous IMU
+      frame.
+    * ``known``: what the decoder knew before some of the frames. Each entry: number of frames
+      before the frame, and the fields of ``Context``.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -73,7 +74,7 @@ class Walk:
         self.known: list[tuple[int, Any]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
-        """Add a frame that ends at ``end``. ``before``: what was known before the frame."""
+        """Add a frame that ends at ``end``. ``before``: what the decoder knew before the frame."""
         number = len(self.frames)
         is_lesson = not number % LEARN_EVERY and not before.imus & 3
         if is_lesson and type(frame) is ImuFrame and before.imu is not None:
@@ -103,8 +104,8 @@ def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     A complete frame shows that the unusual content comes from a shock of the robot, not from
     damage. The result is False if the bytes after the complete frame cannot begin another frame.
 
-    ``held``: the bytes that the decoder holds. ``closed``: whether no more bytes come. This is the
-    result if ``at`` is the end of ``held``.
+    ``held``: the bytes that the decoder holds. ``closed``: whether no more bytes come. If ``at`` is
+    the end of ``held``, the result is ``closed``.
     """
     if at == len(held):
         return closed

@@ -49,7 +49,10 @@ PACE_S: Final = 2e-4
 Within this tolerance, the bytes did not wait for the reader.
 """
 FEW_BYTES: Final = 2
-"""Number of bytes. The driver measures how fast bytes arrive only if there are more than this."""
+"""Largest number of bytes that is too small to measure how fast the bytes arrive.
+
+The bytes belong to a frame with a pause, and arrive after the read that ended the pause.
+"""
 TICKS_TO_PROVE: Final = 2
 """Number of further late ticks, after a first late tick, that prove that bytes were lost.
 
@@ -170,11 +173,11 @@ def _by_the_next_frame(
 ) -> Cause:
     """Return the cause of a pause within a supposed frame, as shown by the bytes after this frame.
 
-    * If these bytes are not a frame, the line was idle.
-    * If these bytes are a frame with a pause in it, the time between the ends of the two pauses
-      decides. The line was idle if this time is a whole number of ticks: each supposed frame then
-      consists of parts of two frames that the board sent.
-    * Otherwise, the reader was late.
+    * These bytes are not a frame: the line was idle.
+    * These bytes are a frame with a pause, and the second pause ended a whole number of ticks after
+      the first pause: the line was idle. At the end of each pause, the board began a new frame.
+    * These bytes are a frame with a pause that ended at any other time: the reader was late.
+    * These bytes are a frame without a pause: the reader was late.
 
     The result is UNDECIDED while the next frame is incomplete.
 

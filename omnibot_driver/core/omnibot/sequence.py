@@ -52,9 +52,9 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: whether ``restarted`` is True although the board has probably continued. After a
-      pause, this is so if a restart would mean more lost deltas than a continued count. After a
-      silence, this is so if the new delta has the next count.
+    * ``doubtful``: True if ``restarted`` is True although a restart is improbable. After a pause of
+      the board, a restart is improbable if it would mean more lost deltas than a continued count.
+      After a silence, a restart is improbable if the new delta has the next count.
     """
 
     lost: int

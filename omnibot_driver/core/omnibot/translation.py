@@ -51,8 +51,8 @@ number is below 4096.
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The next read is late if its bytes are too many for the time since the previous read: the board
-needs more than twice the time since the previous read, plus ``BURST_S``, to send these bytes.
+The driver computes how long the board needs to send the bytes of the next read. The next read is
+late if the result is longer than twice the time since the previous read, plus ``BURST_S``.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2

@@ -86,8 +86,8 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s of the last read that brought a new tick.
 
-        The next read with a new tick may follow within half a period. The board's ticks are a whole
-        period apart, so the earlier tick was then read late.
+        If the next new tick is read less than half a period later, the earlier of the two reads was
+        late, because the board's ticks are a whole period apart.
         """
         self._awaited: Point | None = None
         """Number of the next tick, and the earliest time in s at which the last byte of its sample
@@ -218,9 +218,8 @@ class DeviceClock:
         Return the correction in ticks. It is positive if the count was too low because of lost
         ticks.
 
-        ``counted``: whether this read contains a displacement. If so, the displacement's tick
-        number is corrected too. If all recent arrivals were late, the tick number of the last
-        displacement is always corrected.
+        ``counted``: whether this read contains a displacement. The tick number of the last
+        displacement is corrected too if ``counted`` is True, or if all recent arrivals were late.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -269,8 +268,8 @@ class DeviceClock:
 
         ``lag_s``: the delay in s. It is the tick's arrival minus its time by the fitted clock.
 
-        If the previous tick was read less than half a period before ``now``, that read was late.
-        The new delay then replaces the delay of the previous tick.
+        If the previous tick was read less than half a period before ``now``, the read of the
+        previous tick was late. So the new delay replaces the delay of the previous tick.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -287,9 +286,9 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: length of a step, in s, if the remaining stamps of this read divide the time
-        from the last stamp to the read into equal steps. The step to the new stamp is at least half
-        a period or ``room_s``, whichever is shorter, and at least ``SMALLEST_STEP_S``.
+        ``room_s``: step in s with which the remaining stamps of this read fit evenly between the
+        last stamp and the read. The step to the new stamp is at least half a period or ``room_s``,
+        whichever is shorter, and at least ``SMALLEST_STEP_S``.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -169,10 +169,10 @@ class MartServer(ServerState):
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` when a motion of ``kind`` is reported to ``port`` as started or ended.
+        """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
 
-        The method ``post`` makes these reports. If no port has waited for an earlier report, the
-        report was kept, and ``then`` is called at once.
+        If ``post`` has kept such a report, because no port waited, ``then`` is called at once.
+        Otherwise, ``port`` waits for the next report.
         """
         motion = self.motions[kind]
         if motion.posts:

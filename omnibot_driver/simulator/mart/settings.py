@@ -26,8 +26,8 @@ class Quirks:
     * ``drives_trust_imu``: without an IMU, RM, R and L start, and uncontrolled motions continue,
       but obstacles, starts and stops are not detected.
     * ``reference_speed_wraps``: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
-    * ``reference_start_counts_on``: RM starts its count of samples at the count of the previous
-      RM's stop, not at 0. The reply to a failed RM contains the error of the last F or B.
+    * ``reference_start_counts_on``: RM continues the count of samples of the previous RM, instead
+      of counting from 0. A failed RM is answered with the error of the last F or B, not of RM.
     * ``speed_word_first``: a speed word after the number is ignored.
     * ``zero_distance_is_unlimited``: TF, TB, MCF and MCB with 0 or a word as distance have no
       limit.

@@ -116,7 +116,7 @@ class Client:
         }
 
     def set_parameters(self, values: Mapping[str, Value]) -> None:
-        """Set parameters of the running driver. Raises ToolError if the driver refuses one."""
+        """Set parameters of the running driver. Raises ToolError if the driver rejects a value."""
         messages = [
             Parameter(name, value=value).to_parameter_msg() for name, value in values.items()
         ]

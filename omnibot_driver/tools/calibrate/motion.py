@@ -31,8 +31,10 @@ SLOW_LOOK_S: Final = 3.0
 """Time, in s, over which the tool compares the commanded with the measured motion, if the board has
 one of the parameters in ``SLOW``. For other boards, the time is ``LOOK_S``."""
 SLOW: Final = ("odom_rate", "front_wheel_offset")
-"""Each of these parameters shows that a board's measured motion may follow a command late. Either
-the board rarely measures its motion, or its front wheel must first turn to the new direction."""
+"""Parameters by which the tool recognises a board whose measured motion may follow a command late.
+
+Such a board measures its motion rarely, or must first turn its front wheel to the new direction.
+"""
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"

@@ -44,9 +44,10 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Mean integral of the absolute error of a step, divided by the final speed, in s.
+        """Mean over all steps of the integrated absolute speed error, in s.
 
-        The integral begins at the first tick.
+        The error is a fraction of the final speed. The integral begins at the first smoothed speed
+        (``Response.rpm``).
         """
         errors = []
         for one in self.steps:

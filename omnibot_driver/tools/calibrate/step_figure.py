@@ -34,7 +34,9 @@ def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: G
         "Measured speed as a fraction of the step (mean over 40 ms)", fontsize=10
     )
     measured[-1, 0].legend(fontsize=7, loc="lower right")
-    measured[-1, 0].set_xlabel("time from the control tick to the middle of the 40 ms mean, in ms")
+    measured[-1, 0].set_xlabel(
+        "time from the control tick to the middle of the averaged 40 ms, in ms"
+    )
     command, load = right.subplots(2, 1, sharex=True)
     motors = [wheel.motor for wheel in wheels]
     _draw_predictions(command, motors, now, better, command=1.0, load=0.0)

@@ -34,7 +34,7 @@ class Model:
 
     * ``names``, ``units``: names and units of the parameters. The first parameter is the gain.
     * ``start``, ``low``, ``high``: starting values and bounds of the parameters.
-    * ``turned``: the function ``Turned`` of this model.
+    * ``turned``: the function that returns the wheel's angle after the step (see ``Turned``).
     """
 
     title: str

@@ -45,14 +45,15 @@ LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered. The
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive times between ticks, A and B. The
-board has missed a mark during A if the sum is above this limit, and the error of A is above half of
-this limit.
+"""Limit for the sum of the relative errors of two successive times between encoder ticks.
 
-* If the board has missed a mark, A covers two distances between marks. The sum is then about 1, or
-  smaller if the board's clock loses up to 6 ms.
-* If the board has noticed a mark late, A is too long, and B is too short by the same time. The sum
-  is then near 0.
+The board has missed a mark of the encoder during the first time if the sum is above this limit, and
+the error of the first time is above half of this limit.
+
+* If the board has missed a mark, the first time is twice as long as expected. So the sum is about
+  1, or smaller if the board's clock loses up to 6 ms.
+* If the board has noticed a mark late, the first time is too long, and the second time is too short
+  by the same amount. So the sum is near 0.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record that are not searched for missed marks, because the
@@ -282,7 +283,10 @@ class Search:
         return np.concatenate([self._whitener[: len(row), : len(row)] @ row for row in rows])
 
     def _rows(self, of_all: Column) -> list[Column]:
-        """Split an array with one row for each time into one array for each record."""
+        """Split an array into one array for each record.
+
+        The array has one row for each time between ticks, record after record.
+        """
         return np.split(of_all, np.cumsum(self._lengths)[:-1])
 
     def _told(self, values: Column, off: Column | None = None) -> Column:
