@@ -53,7 +53,7 @@ KNOWN_AFTER: Final = 10
 fewer messages, all of them may have been delayed."""
 
 Differences = tuple[float, float]
-"""Arrival minus sending, in s: with our time of day, and with our steady clock."""
+"""Arrival minus sending, in s: arrival by this computer's time of day, and by its steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -65,11 +65,11 @@ class Line:
         self._overruns = 0
 
     def write(self, data: bytes, now: float) -> bool:
-        """Write the waiting bytes, then ``data``; return False if bytes have waited too long.
+        """Write the waiting bytes, then ``data``; return False if bytes have waited for 0.2 s.
 
-        The result is True if the line is already regarded as missing. A missing line may still have
-        an open port, for example if it was blocked. This port gets only the part of ``data`` that
-        it accepts at once.
+        If the result is False, the waiting bytes are discarded, and the caller must regard the line
+        as missing. If the line is already missing, the result is True. If the port of a missing
+        line is still open, the port gets only the part of ``data`` that it accepts at once.
         """
         if self.port is None:
             return True

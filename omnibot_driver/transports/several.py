@@ -131,13 +131,11 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """Write each packet to its line.
+        """Write each packet to its line, and keep the bytes that the line does not accept at once.
 
-        * A line that does not accept all bytes at once: the other bytes wait.
-        * A line whose bytes have waited for 0.2 s without a break: these bytes are discarded, and
-          the line is regarded as missing.
-        * A missing line with an open port: only the bytes that the port accepts at once are
-          written.
+        If a line has had waiting bytes for 0.2 s without a break, even if it accepted some, its
+        waiting bytes are discarded, and the line is regarded as missing. A missing line whose port
+        is still open gets only the bytes that the port accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -217,9 +215,9 @@ class Several:
         return all(own < other for other in paths)
 
     def _write_what_waits(self, now: float) -> None:
-        """Write the waiting bytes, and let ``poll`` report when a full line accepts more.
+        """Write the waiting bytes; if some remain, let ``poll`` report when the line accepts more.
 
-        A line whose bytes have waited for 0.2 s (``WRITE_TIMEOUT_S``) becomes a missing line.
+        A line that has had waiting bytes for 0.2 s (``WRITE_TIMEOUT_S``) becomes a missing line.
         """
         with self._writing:
             for line in self._lines:

@@ -118,9 +118,9 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step between two timestamps, the end of its group of steps.
 
-    A group begins with its long step, ends before the next long step, and has at most ``most``
-    steps (at least one). The returned end is the index after the last step of the group. If the
-    steps after the long step are short enough to make up for it, no message is missing. ``wide``:
+    A group begins with its long step, and ends before the next long step or after ``most`` steps
+    (at least one). No message is missing if the steps after the long step are short enough to make
+    up for the long step. The returned end is the index after the last step of the group. ``wide``:
     indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)

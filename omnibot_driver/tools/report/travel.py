@@ -26,8 +26,8 @@ RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
 """Smallest time in s between two odometry messages that is regarded as a gap.
 
-In a gap, the twists of the messages do not show the motion, so only a jump to the zero pose is
-found.
+In a gap, the twists of the messages do not show the motion. So a change of the pose over a gap is
+regarded as a jump only if the pose after the gap is zero.
 """
 
 

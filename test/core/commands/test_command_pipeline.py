@@ -84,7 +84,7 @@ def notices(bench: Bench) -> list[str]:
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
     """A diagonal motion is commanded to a base that cannot move sideways.
 
-    The base drives forward only, and one notice says so. A command with NaN is refused.
+    The base drives forward only, and one notice says so. A command with NaN is rejected.
     """
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))

@@ -37,7 +37,7 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
     """After a stop by the motion monitor, a pause in the commands ends the refusal of motion.
 
-    It must last for the command timeout, counted from the last command.
+    The pause must last for the command timeout, counted from the last command.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)

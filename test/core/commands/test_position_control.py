@@ -102,10 +102,7 @@ def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(tur
 
 
 def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
-    """A goal does not fit into 16-bit words.
-
-    The driver rejects it, and the old goal stays active.
-    """
+    """The driver rejects a goal that does not fit into 16-bit words, and keeps the old goal."""
     bench.go_to(0.2, 0.0, 0.0)
     for x in (33.0, 1e300, -1.7e308):
         with pytest.raises(CommandRefused, match="the limits are"):

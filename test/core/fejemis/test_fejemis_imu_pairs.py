@@ -322,7 +322,8 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
     """The samples at the beginning of a late read are published.
 
-    They wait for the first pose, which shows that the board was not silent.
+    The time before a late read looks like a silence of the board. So the driver holds these samples
+    until the next pose shows that no samples are missing.
     """
     bench = nominal()
     bench.run(3.0)

@@ -171,10 +171,10 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """Stamps of extra readings must increase only among readings of the same kind.
+    """Stamps of board-specific readings (``ExtraReading``) increase within each type of content.
 
-    If a stamp equals the last stamp of its kind, it becomes 1 µs later. If a stamp is earlier than
-    the last stamp of another kind, it is not changed.
+    If a stamp equals the last stamp of its type, it becomes 1 µs later. If a stamp is earlier than
+    the last stamp of another type, it is not changed.
     """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):

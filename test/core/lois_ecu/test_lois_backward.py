@@ -72,7 +72,8 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them() -> None:
     """The driver uses all of the reports that a busy computer reads at once, every 0.05 to 0.35 s.
 
-    The reports show each wheel that stops. Otherwise, the position would be wrong by 4 m.
+    If reports were skipped, the driver would not see each wheel that stops, and the position would
+    be wrong by 4 m.
     """
     one = motion(wrong("firmware", 1054), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert off_m(one) < 0.5 * one.way_m

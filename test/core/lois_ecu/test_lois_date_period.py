@@ -37,10 +37,10 @@ class DeafBench(Bench):
 @pytest.mark.slow
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """The driver sets the period of the date several times, and one of these lines is lost.
+    """The board has the right period of the date although a line that sets the period is lost.
 
-    The board still has the right period. The driver sets the period again because its request for
-    one date ends the periodic dates.
+    The driver requests one date, which ends the periodic dates, and then sets the period again
+    several times. The test loses each of these lines in turn.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):

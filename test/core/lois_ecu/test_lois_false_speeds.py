@@ -43,12 +43,14 @@ class Reports:
         still: bool = False,
         passed_s: float = PERIOD_S,
     ) -> None:
-        """Pass a report to the odometry.
+        """Pass a tick report and an odometry report to the odometry.
 
         * ``rpm``: reported speeds of the left and the right wheel in RPM.
-        * ``ticks``: newly counted ticks.
-        * ``still``: whether no wheel has ticked, so that the board's pose is the same.
-        * ``passed_s``: for how long the board has moved its pose with these speeds.
+        * ``ticks``: newly counted ticks of the left and the right wheel.
+        * ``still``: whether the board repeats its last odometry report, because no wheel has
+          ticked.
+        * ``passed_s``: time in s for which the board has moved its pose with ``rpm``, unless
+          ``still``.
         """
         self._now += PERIOD_S
         left, right = (one * UNIT_MPS for one in rpm)

@@ -132,8 +132,8 @@ def test_no_setting_follows_a_set_point_directly(reads_s: float) -> None:
 def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) -> None:
     """A setting that waited for the end of a drive is sent at least 15 ms after the last Stop.
 
-    There is an exception: if the settings writer is called only just after each repeated Stop,
-    every 50 ms, it sends the setting 0.5 s after the first Stop.
+    The setting waits for at most 0.5 s after the first Stop, even if the settings writer is called
+    only at the times of repeated Stops.
 
     Regression: a setting that had waited for more than half a second was sent directly after the
     Stop.

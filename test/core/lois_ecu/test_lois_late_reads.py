@@ -104,8 +104,8 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
     """The board restarts, and its clock begins at zero.
 
-    The driver adds the reading of this clock to the last time before the restart. The sum is the
-    estimated time of a later report.
+    The estimated time of a report after the restart is the sum of the last time before the restart
+    and the clock value in this report.
     """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)

@@ -72,11 +72,10 @@ def periods_written(bench: Bench, ticks_ms: int) -> int:
 
 
 def test_a_long_period_is_written_four_times() -> None:
-    """The user sets the tick period to 0.5 s, and the driver writes the period at least four times.
+    """The driver writes a period of 0.5 s for the tick reports at least four times.
 
-    The board can lose single lines. The ticks do not show whether the board has lost this line:
-    they may come every 0.4 s by the board's own setting, and 0.4 s is too near to 0.5 s for the
-    driver.
+    A line may be lost, and the driver cannot detect the loss: tick reports with the board's own
+    period of 0.4 s come at nearly the same rate.
     """
     bench = Bench("firmware", own_periods=True)
     bench.run(5.0)

@@ -81,10 +81,10 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(name: str, with_sum:
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_settings_that_lose_up_to_two_characters_never_command_a_motion(with_sum: bool) -> None:
-    """The driver's lines of settings and modes lose up to two characters on the way to the board.
+    """Lines of settings and modes lose up to two characters on the way to the board.
 
-    The board expects no checksums. Lines that have a checksum nevertheless are too long for the
-    board. The firmware never finds a motion command in the remaining characters.
+    At the beginning, the board expects no checksums, even if the lines have them. The firmware
+    never finds a motion command in the remaining characters.
 
     Regression: a Stop with a checksum lost two zeros, and commanded 59 % duty to the right wheel.
     """
@@ -121,11 +121,11 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """Two set-points follow each other, and as many adjacent characters are lost as one line has.
+    """The loss of 14 adjacent characters can turn two set-points into a wrong set-point.
 
-    The beginning of the first line and the end of the second can form a wrong set-point. The board
-    receives nothing for at most 13 ms. The driver therefore sends set-points at least 18 ms apart,
-    so that no loss reaches from one to the next.
+    A line has 14 characters, so the beginning of the first set-point then joins the end of the
+    second. The board may lose all characters for up to 13 ms, so the driver sends set-points at
+    least 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -133,11 +133,11 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 
 
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
-    """A setting follows a Stop, and 14 adjacent characters are lost, as many as one line has.
+    """The loss of 14 adjacent characters can turn a Stop and a setting into a full-duty command.
 
-    The beginning of the Stop and the end of the setting (low-pass coefficient) can form a command
-    of full duty. The board receives nothing for at most 13 ms. The driver therefore sends a setting
-    at least 15 ms after a set-point. If the setting comes first, there is no danger.
+    If the Stop comes first, its beginning can join the end of the setting (low-pass coefficient).
+    The board may lose all characters for up to 13 ms, so the driver sends a setting at least 15 ms
+    after a set-point. If the setting comes first, there is no danger.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
@@ -151,11 +151,11 @@ def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> No
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """An LED line follows a motion line, and as many adjacent characters are lost as one line has.
+    """The loss of adjacent characters can turn a motion line and an LED line into a wrong motion.
 
-    The beginning of the motion line and the end of the LED line can form a wrong motion line. The
-    board receives nothing for at most 13 ms. The driver therefore sends an LED line at least 15 ms
-    after a motion line. If the LED line comes first, there is no danger.
+    If the motion line comes first, its beginning can join the end of the LED line. The board may
+    lose all characters for up to 13 ms, so the driver sends an LED line at least 15 ms after a
+    motion line. If the LED line comes first, there is no danger.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

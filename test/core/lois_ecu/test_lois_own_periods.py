@@ -177,7 +177,7 @@ def test_a_reset_is_confirmed_although_the_first_one_is_lost(firmware: str) -> N
 def test_a_stall_of_the_driver_is_within_3_sigma(firmware: str, stall_s: float) -> None:
     """The driver stalls while the robot drives, and then reads all reports at once.
 
-    The robot stops, and the error of the position is within 3 sigma or 6 cm.
+    The robot stops, and the error of the position is below 3 sigma or 6 cm, whichever is larger.
     """
     bench = Bench(firmware, own_periods=True)
     bench.run(4.0)

@@ -98,11 +98,11 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """The board reports 14 RPM three times, after a pause in which the driver has estimated 28 RPM.
+    """The detector finds a wheel at rest although the board has not reported the fall of its speed.
 
-    The detector is certain that the wheel is at rest: the wheel has stopped during the pause, and
-    the board repeats the last speed. The board pauses its reports of the speeds while both wheels
-    have the same speed.
+    The board reports no speeds while both wheels have the same speed, and the driver estimates 28
+    RPM. Then the board reports 14 RPM three times. The equal reports make the detector certain: the
+    board repeats the last speed of a stopped wheel.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -113,10 +113,10 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
 
 
 def test_a_fall_in_gaps_between_reports_is_seen() -> None:
-    """Most reports are lost, so a wheel's speed seems to take 1 s to fall to 9 RPM.
+    """The detector finds a wheel at rest although most reports of its falling speed are lost.
 
-    The board then reports 9 RPM twice more. The detector is certain that the wheel is at rest,
-    because the speed may have fallen faster than the few reports show.
+    The remaining reports are 0.5 s apart, and show a fall to 9 RPM. Two more reports of 9 RPM make
+    the detector certain: the board repeats the last speed of a stopped wheel.
     """
     assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
     assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
@@ -133,10 +133,10 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """Most reports are lost, and all others report nearly the same speed of a wheel.
+    """If most reports are lost, eleven equal reports make the detector certain of a wheel's rest.
 
-    After eleven equal reports, the detector is certain that the wheel is at rest. The speed may
-    have been higher in the lost reports, and the board repeats the last speed of a stopped wheel.
+    The lost reports may have shown a fall of the speed, and the board repeats the last speed of a
+    stopped wheel. If no report is lost, the same speeds do not show rest.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
@@ -147,9 +147,9 @@ def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that
 
 
 def test_reports_that_are_read_late_are_not_lost() -> None:
-    """The driver reads some reports of a nearly constant speed late, but no report is lost.
+    """If reports are late but not lost, a wheel with a nearly constant speed is assumed to roll.
 
-    The detector assumes that the wheel rolls, because no report of a higher speed can be missing.
+    No report shows a fall of the speed, and no report is missing. So the wheel has not stopped.
     """
     wheel = told(13, 13, 13)
     for _ in range(10):

@@ -94,8 +94,8 @@ def encode_command_duty(left: int, right: int) -> bytes:
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
     """The driver sends RPM 0/0 before each of the first three set-points after a Stop.
 
-    After a Stop, the board still uses the last measured speed of a wheel at rest, and might never
-    start the wheel. RPM 0/0 clears this speed.
+    After a wheel has stopped, the board still uses the speed that it measured last, and might never
+    start the wheel again. RPM 0/0 clears this old speed.
     """
     ecu = started()
     drive = b":020014001438\n"
@@ -110,7 +110,7 @@ def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
 
 
 def test_a_record_that_cannot_complete_is_refused() -> None:
-    """The driver refuses records of 0 or over 1024 samples: the board cannot complete them."""
+    """The driver rejects records of 0 or over 1024 samples: the board cannot complete them."""
     ecu = started()
     for samples in (0, 1025):
         with pytest.raises(RequestRefused, match="1 to 1024"):

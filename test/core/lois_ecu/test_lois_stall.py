@@ -50,7 +50,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
 
 
 def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> None:
-    """A wheel is commanded forward and does not tick. A stall is reported every 2 s."""
+    """The detector reports a wheel that is commanded forward but does not tick, once every 2 s."""
     assert watched(SetRpm(20, 10), ticks=(3, 0), ways_m=0.1) == [2.0, 4.0, 6.0]
 
 
@@ -155,10 +155,10 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel looks stalled if the odometry assumes that it is at rest, and if it gets no power.
+    """The detector reports a wheel that the odometry assumes to be at rest and that gets no power.
 
-    The board repeats the last speed of a wheel at rest. Here, this speed is just above the
-    set-point. So the speed controller gives no power, and the wheel cannot start by itself.
+    The board repeats the wheel's last speed, which is just above the set-point. So the speed
+    controller gives the wheel no power, and the wheel cannot start by itself.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))

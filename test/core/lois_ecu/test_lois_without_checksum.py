@@ -103,9 +103,10 @@ def test_a_board_that_expects_checksums_unnoticed_drives_again_after_a_rest(firm
 def test_a_rolling_board_that_was_left_with_the_other_form_of_lines_is_stopped(
     firmware: str, *, with_sum: bool, commands: bool
 ) -> None:
-    """A board that another program left rolling, with the opposite checksum setting, obeys a Stop.
+    """The driver stops a rolling board whose checksums another program has switched on or off.
 
-    The Stop arrives within half a second after the port is opened, with or without commands.
+    The board's checksum setting is the opposite of the driver's. A Stop that the board obeys
+    arrives within half a second after the port is opened, even if the user commands a motion.
 
     Regression: the robot rolled on for seconds, because the board ignored each Stop.
     """

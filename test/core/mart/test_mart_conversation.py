@@ -298,10 +298,10 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """The driver expects the angle of a turn, and receives the number of a late encoder count.
+    """The odometry does not use an old encoder count that arrives in place of the angle of a turn.
 
-    This number contradicts the present encoder count, so the odometry computes the turn from the
-    encoder count alone.
+    The count is 3, and a turn by 3° contradicts the present encoder count. So the odometry computes
+    the turn from the encoder count alone.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

@@ -156,7 +156,7 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 
 def test_diagnostics_have_the_rate_of_odom() -> None:
-    """/diagnostics contain the set rate of odom. The report tool compares the real rate with it."""
+    """The topic /diagnostics contains the user's rate of ``odom``, for the report tool."""
     assert MartBench(settings=MartSettings(odom_rate_hz=10.0)).board.figures.odom_hz == 10.0
 
 

@@ -47,8 +47,8 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
     """The server rejects one RM (forward drive), and obeys the next. Later, the robot is pushed.
 
-    A server that rejects RM, and moves the robot nevertheless, is defective. The driver does not
-    regard this server as defective, and refuses no motion.
+    The driver does not regard the server as defective, and refuses no motion. A defective server
+    rejects RM and moves the robot nevertheless.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None:
     """Something holds both wheels in a slow drive. The driver learns nothing about the motors.
 
-    The next slow drive is soon as fast as commanded, and not faster.
+    One second after its start, the next slow drive has the commanded speed.
     """
     bench = MartBench("source").ready()
     bench.command(0.06, 0.0, 3.0)

@@ -203,9 +203,9 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """The first move of a robot goes only half as far as requested, and the odometry stays right.
 
-    The network loses the driver's queries after the move, so the driver stops a possible second run
-    of the move. The encoder would show the same count if a second run had been stopped halfway. The
-    driver does not assume this, because it has not learned yet how far this robot drives.
+    The network loses the driver's queries after the move, so the driver sends a stop against a
+    possible second run. Half a distance could mean that this stop has ended a second run. But the
+    driver has not learned yet how far this robot drives, so it assumes that there was only one run.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)

@@ -147,7 +147,8 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
     """The goal is not discarded although all replies come 0.28 s late.
 
     After each move, the driver sends a stop, because the network may have delivered the move twice.
-    A quick reply to this stop shows that no second run has begun.
+    The server needs 0.3 s to stop a second run, so a reply after 0.28 s shows that there was no
+    second run.
 
     ``copied``: whether the network duplicates the move. If it does, the robot makes two runs, and
     the driver adds the first run to the odometry.

@@ -153,8 +153,8 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
 def met_in_a_pivot(firmware: Firmware, away_s: float) -> MartBench:
     """Return a test bench whose driver starts while RM turns the robot about its right wheel.
 
-    The network fails for ``away_s`` seconds from the driver's start. In this time, no stop of the
-    driver is answered, so the driver has used the stop port.
+    The network fails for ``away_s`` seconds from the driver's start. The server answers no stop in
+    this time, so the driver uses the stop port before the network works again.
     """
     bench = MartBench(firmware)
     bench.server.receive(b"RM 30", 0, None, 0.0)
@@ -223,7 +223,7 @@ def test_a_server_that_is_lost_in_a_drive_is_reported_after_one_and_a_half_secon
 ) -> None:
     """If the network is cut in a drive, the state is ``connecting`` 1.5 s after the last reply.
 
-    The stop in the meantime does not delay the change of state.
+    A stop that the driver sends in this time does not delay the change of state.
     """
     bench = MartBench("source").ready()
     bench.command(*motion, 2.0)

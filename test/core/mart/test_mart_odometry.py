@@ -315,7 +315,7 @@ def test_the_covariance_includes_a_change_that_is_carried_out_twice(
 
 
 def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
-    """Twice, the robot may have turned by any angle. It drives 2 m forward, and later 2 m back.
+    """After an unknown turn, the robot drives 2 m forward; after another unknown turn, 2 m back.
 
     The two true directions differ, so x is uncertain by more than 1 m.
 

@@ -12,7 +12,7 @@ PAGE = Path(__file__).parents[3] / "docs/internals/mart_protocol.md"
 
 
 def test_every_command_has_its_row() -> None:
-    """The page has a row for every command, and marks the commands that the driver never sends.
+    """The protocol page has a row for every command, and marks those that the driver never sends.
 
     The marked commands are those in ``NEVER_SAID``, and TD.
     """

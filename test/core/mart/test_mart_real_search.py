@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Some trials of ``real_search``, which is a bounded search with the real driver."""
+"""Some trials of ``real_search``, which runs the real driver against the simulated server.
+
+In most trials, one datagram is lost, late or doubled, the IMU dies, or the network is interrupted.
+"""
 
 from collections.abc import Callable
 from random import Random

@@ -42,7 +42,7 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """The search finds no case in which the server crashes or hangs, or nothing stops the robot.
+    """The server never crashes or hangs, and the robot can always be stopped.
 
     The search tries all cases in which up to two copies and one reply are late, and the IMU may die
     at any step. If the IMU is dead, or the driver has given the server up, the search allows

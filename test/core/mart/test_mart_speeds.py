@@ -262,9 +262,9 @@ def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> N
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
-    """If the rate of a turn falls slowly, the turn is not begun anew at each step.
+    """A turn whose commanded rate falls slowly is not started again at each step.
 
-    A new start waits until the rate has been constant for a while.
+    The driver starts the turn again only when the commanded rate has been constant for a while.
     """
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):

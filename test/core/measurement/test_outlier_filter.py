@@ -56,8 +56,7 @@ def trembling(random: Random) -> list[float]:
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
     """Return ``count`` noisy readings of an IMU at rest, with 1 g upward, and with ``leaps``.
 
-    ``leaps``: numbers that are added to the values, in m/s² or rad/s. The first key is the index of
-    a reading, the second key is the index of a value in this reading.
+    ``leaps[i][k]``: number, in m/s² or rad/s, that is added to value ``k`` of reading ``i``.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
@@ -227,11 +226,11 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 @pytest.mark.parametrize("longer", [1.05, 1.5, 2.0, 3.0])
 def test_a_steady_motion_over_a_longer_time_is_delivered_at_once(longer: float) -> None:
-    """In a steady drive, a displacement is released at once even if it lasts three times as long.
+    """The filter releases a displacement at once even if its duration is three times the usual one.
 
-    The displacement lasts longer than the others, for example because a pose was lost before it.
-    Regression: the filter took a displacement with twice the usual duration for a spike, and
-    ``odom`` lost 4 cm.
+    The robot drives steadily, and one displacement contains the motion of a longer time, for
+    example because a pose was lost before it. Regression: the filter took a displacement with twice
+    the usual duration for a spike, and ``odom`` lost 4 cm.
     """
     steady = DisplacementReading(0.02, 0.0, 0.04, "body", 0.02, 0)
     both = longer * steady.dx_m, longer * steady.dyaw_rad
