@@ -183,7 +183,7 @@ def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense
 
 @pytest.mark.parametrize("length", range(52))
 def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
-    """A middleware delivers a Twist with too few bytes. The driver refuses it."""
+    """The driver rejects a Twist message that has too few bytes."""
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="not a valid Twist"):
         cdr.twist(data[:length])

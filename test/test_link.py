@@ -149,10 +149,10 @@ class SlowShutdown:
 def test_the_process_does_not_give_up_while_the_link_waits_for_the_slowest_proofs(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The longest possible shutdown of a link is shorter than the time limit of the driver's end.
+    """The longest possible shutdown of a link takes less time than ``LONGEST_END_S``.
 
-    The shutdown includes the longest waits for two proofs of a standstill, and the time for the
-    guard's last words.
+    After this time, the driver ends its process by force. The shutdown includes the longest waits
+    for two proofs of a standstill, and the time for the guard's last words.
     """
     traits = load(name).make(check_all({"board": name})).traits
     proof, slow = StopProof(traits.stands_after_s), 60.0 * RAREST_S
@@ -225,7 +225,7 @@ def test_an_estop_is_written_before_the_call_returns(
 
 
 def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
-    """A command is refused. The caller gets an exception, and the link continues to work."""
+    """A command is rejected. The caller gets an exception, and the link continues to work."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()

@@ -96,7 +96,7 @@ def test_a_goal_is_in_the_odometry_frame_or_in_none(frame: str) -> None:
 def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
     wrong: PoseStamped, said: str
 ) -> None:
-    """A goal is refused for a wrong frame, a number that is not finite, or an invalid rotation."""
+    """The driver rejects a goal with a wrong frame, NaN or infinity, or an invalid rotation."""
     with pytest.raises(CommandRefused, match=f"cmd_pose re(fus|ject)ed.*{said}"):
         command_messages.goal_pose(wrong, "odom")
 
@@ -285,7 +285,7 @@ def test_a_yaw_becomes_a_unit_quaternion(yaw_rad: float) -> None:
 
 @pytest.mark.parametrize("axis", ["linear.x", "linear.z", "angular.x", "angular.y", "angular.z"])
 def test_a_twist_that_is_not_finite_anywhere_is_refused_as_it_came(axis: str) -> None:
-    """A Twist with infinity on one axis is refused. The error gives the values of all axes."""
+    """A Twist with infinity on one axis is rejected. The error gives the values of all axes."""
     twist = Twist()
     part, name = axis.split(".")
     twist.linear.y = 0.25

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the outbox. Threads put events into it and deliver them in order, one at a time."""
+"""Tests of the outbox, a queue of calls.
+
+Threads append calls to the queue, and make the calls in order, one at a time.
+"""
 
 import random
 import threading
@@ -171,7 +174,7 @@ def test_a_call_that_is_put_just_before_the_end_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """The outbox is full, so a thread that calls ``deliver`` waits for the thread that delivers.
+    """If the outbox is full, ``deliver`` waits while another thread makes the queued calls.
 
     Without this wait, the outbox could grow without limit.
     """

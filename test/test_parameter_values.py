@@ -42,7 +42,7 @@ def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
 
 @pytest.mark.parametrize("parameter", RANGED, ids=name_of)
 def test_both_ends_of_a_range_are_allowed_and_nothing_beyond(parameter: Parameter) -> None:
-    """Both ends of a range are valid, and values beyond them are refused.
+    """Both ends of a range are valid, and values beyond them are rejected.
 
     The message names the parameter, the range, its unit and the value.
     """
@@ -159,7 +159,7 @@ def test_any_value_is_either_taken_in_the_right_type_or_refused(
 
 @pytest.mark.parametrize("wrong", [[1, 0, 1], [1, 2, 1], [1, 1, 0.5]])
 def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
-    """Values of ``axis_signs`` other than 1 and -1 are refused."""
+    """Values of ``axis_signs`` other than 1 and -1 are rejected."""
     with pytest.raises(ParameterError, match="each 1 or -1"):
         PARAMETERS.by_name["axis_signs"].check(wrong)
 
@@ -181,14 +181,14 @@ def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
 def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     parameter: Parameter, wrong: str
 ) -> None:
-    """An empty frame name, or one with a leading slash, is invalid in tf2, so it is refused."""
+    """A frame name that is empty or has a leading slash is invalid in tf2, so it is rejected."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 
 
 @pytest.mark.parametrize("wrong", ["/", "/robot1/"])
 def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
-    """A frame prefix with a leading slash is refused, because tf2 does not allow it.
+    """A frame prefix with a leading slash is rejected, because tf2 does not allow it.
 
     An empty prefix is valid.
     """

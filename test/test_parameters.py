@@ -151,7 +151,7 @@ def test_what_is_not_given_is_the_default() -> None:
     ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, meant: str) -> None:
-    """An unknown name is refused, and the error gives the most similar known name.
+    """An unknown parameter name is rejected, and the error gives the most similar known name.
 
     rclpy alone would ignore the unknown name.
     """
@@ -161,7 +161,7 @@ def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, me
 
 @given(st.text())
 def test_any_unknown_name_is_refused(name: str) -> None:
-    """Any unknown name is refused, even if it is similar to a known name, or empty."""
+    """Any unknown parameter name is rejected, even if it is similar to a known name, or empty."""
     if name not in PARAMETERS.by_name and not boards.owners_of(name):
         with pytest.raises(ParameterError, match="the nearest is"):
             check_all({name: 1})
@@ -189,7 +189,7 @@ def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_contro
 ) -> None:
     """With position control, the sign of the yaw axis must be the product of the signs of x and y.
 
-    Other signs are refused. With velocity control, they are accepted.
+    Other signs are rejected. With velocity control, they are accepted.
     """
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
@@ -296,10 +296,10 @@ def test_the_file_tells_what_each_parameter_may_be(parameter: Parameter) -> None
 def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
     kind: str, unit: str, fastest: float
 ) -> None:
-    """The driver refuses a speed limit that is above the fastest possible speed.
+    """The driver rejects a speed limit that is above the fastest possible speed.
 
-    Without this check, the odometry would reject every displacement of a fast robot, without a
-    message.
+    Otherwise, the odometry would reject every displacement of a robot that drives faster than this
+    speed, without a message.
     """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest
@@ -314,7 +314,7 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 
 
 def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
-    """If a user sets a distance sensor's minimum above its maximum, the parameters are refused.
+    """If a user sets a distance sensor's minimum above its maximum, the parameters are rejected.
 
     Otherwise, consumers would discard every measurement of the sensor.
     """
@@ -324,6 +324,6 @@ def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
 
 
 def test_a_minimum_without_a_maximum_is_accepted() -> None:
-    """A minimum is accepted if the board has no maximum of the same name."""
+    """A parameter ``battery_minimum`` is accepted if the board has no ``battery_maximum``."""
     row = Parameter("battery_minimum", 20.0, "V", "Lowest voltage.", low=0.0, high=60.0)
     assert parameters.table("omnibot", OmniBot.traits, own={"Own": (row,)}).check_all({})

@@ -142,10 +142,10 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The first poses come after a second, in which the odometry has assumed heading 0.
+    """If two poses agree, the odometry uses their heading, even if the poses come late.
 
-    These poses agree with each other, so the odometry uses their heading for later motion. Odom
-    does not jump.
+    For 1 s, the board sends no pose, so the odometry assumes heading 0. Then two equal poses come.
+    The odometry uses their heading for later motion, and odom does not jump.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):

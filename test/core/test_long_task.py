@@ -55,10 +55,10 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A long task does not end while the robot is at rest from the beginning of the task.
+    """A robot that is at rest from the beginning of a long task does not make the task fail.
 
-    Later, the robot is driven. When the robot is then stopped, the task fails, and the message says
-    that the robot was stopped.
+    Later, the robot is driven and then stopped. Now the task fails, and the message says that the
+    robot was stopped.
     """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)

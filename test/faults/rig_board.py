@@ -33,9 +33,10 @@ class RigBoard:
 
     ``old_bytes_s``: time that the board needs to receive all old commands from a full port.
 
-    ``ends_later_s``: additional time that the driver may take to end.
+    ``ends_later_s``: time that is added to the usual limit for the driver's end.
 
-    ``rests_later_s``: additional time until the robot is at rest after several simultaneous faults.
+    ``rests_later_s``: time that is added to the usual limit for the robot to come to rest after
+    several simultaneous faults.
 
     ``deaf_s``: longest time for which the board may ignore its input.
 

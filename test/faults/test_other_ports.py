@@ -10,9 +10,10 @@ from other_rigs import NetworkRig
 from stuck import NETWORK
 
 LEFT_OUT = "socket: the server delays the data to the board"
-"""Name of a case that this module omits.
+"""Name of a fault that this module omits.
 
-A similar case is tested: the server delays all data. ``make faults`` runs both cases.
+This module tests a similar fault: the server delays the data in both directions. ``make faults``
+tests both faults.
 """
 CASES = {name: case for name, case in NETWORK.items() if name != LEFT_OUT}
 

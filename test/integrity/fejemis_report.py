@@ -129,7 +129,7 @@ def play(stream: Stream) -> Iterator[Event]:
 
 
 def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
-    """Damage both lines of a stream independently."""
+    """Damage the line of the drive board and the line of the front board independently."""
     drive, front = (
         pieces.damaged([both[channel] for both in stream], fault, random) for channel in (0, 1)
     )

@@ -15,16 +15,16 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
-The judge skips frames to find a true frame that equals a decoded frame. After a larger skip, the
-two frames may be equal by chance. So the judge also searches for the next decoded frame of the same
-read, after the true frame that was found. If the judge must skip too many frames again, the first
-decoded frame is wrong.
+The judge skips true frames until one equals the decoded frame. After a larger skip, the two frames
+may be equal by chance. So the judge continues from there, and searches for the next decoded frame
+of the same read. If this second search also skips more than ``MOST_DROPPED`` frames, the judge
+counts the decoded frame of the first search as wrong.
 """
 REACH_BYTES = 600
-"""Distance in bytes from the start of the search for a frame back from the read with this frame.
+"""Number of received bytes by which the judge goes back from the start of a read.
 
-The judge counts the distance in the received bytes. It searches in the sent bytes, and begins there
-300 bytes earlier still.
+From the corresponding byte of the sent stream, the judge goes back another 300 bytes. There, the
+search for the frames of the read begins.
 """
 
 

@@ -46,8 +46,8 @@ class Bound:
     ``long_in``: the number N in "at most one uncommanded set-point of over 2 ms in N control
     frames".
 
-    ``overdue``: whether it is an error if the robot still drives when it must be at rest, or at the
-    end of the trial.
+    ``overdue``: whether two cases are errors: the robot still drives when it must be at rest, and
+    the robot still drives at the end of the trial.
     """
 
     share: float = 1.0

@@ -50,10 +50,10 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the driver's writes in this scene if the board reports ``shown`` from ``tick`` on.
+        """Return a variant of this course, in which the board reports ``shown`` from ``tick`` on.
 
-        ``shown``: the mode of the board, and whether the robot moves. Before ``tick``, the board's
-        states are those of this course.
+        The scene stays the same, and so do the board's states before ``tick``. ``shown``: the mode
+        of the board, and whether the robot moves.
         """
         other = self._others.get((tick, shown))
         if other is None:

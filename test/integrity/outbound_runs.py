@@ -25,10 +25,10 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. The commands differ from script to script."""
 NEEDED: Final = 10_000
-"""Minimum number of trials in which a drive ends, for each receiver and rate of lost bytes.
+"""Minimum number of trials in scenes that end a drive, for each receiver and rate of lost bytes.
 
-Usually, all scenes in which a drive ends share these trials. With 1 byte in 100 lost, each scene in
-``HURRIES`` alone has this number of trials.
+These scenes (``ENDED``) share the trials equally. One exception: with 1 byte in 100 lost, each
+scene in ``HURRIES`` alone has ``NEEDED`` trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -114,11 +114,10 @@ def add(total: Scores, more: Scores) -> None:
 
 
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
-    """Return the sum of the scores of the fault ``fault``.
+    """Return the sum of all scores with the given fault, receiver and scene.
 
-    ``receiver``: empty for all receivers.
-
-    ``scene``: empty for all scenes except ``DRIVES``.
+    An empty ``receiver`` means all receivers. An empty ``scene`` means all scenes except those in
+    ``DRIVES``.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():

@@ -135,9 +135,10 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip a series of writes that arrive undamaged and change nothing, except the last write.
+        """Skip the transmission of writes that arrive undamaged and change nothing.
 
-        The skipped writes count as arrived. The last write goes over the line as usual.
+        The skipped writes count as arrived. The last write of such a series goes over the line as
+        usual.
         """
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1

@@ -332,10 +332,10 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """A turn on the spot shows whether the driver interprets deltas correctly.
+    """The odometry of a turn on the spot shows whether the driver interprets deltas correctly.
 
     In 40 ms at 0.5 rad/s, the robot turns by 20 mrad, and each wheel by 24 counts. If the driver
-    interprets these numbers in the wrong way, the odometry shows another motion.
+    confuses displacements with wheel counts, the odometry also shows linear motion.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)

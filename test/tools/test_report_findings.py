@@ -291,7 +291,11 @@ def test_the_imu_of_another_robot_is_not_expected(
 
 
 def test_no_rate_of_an_omnibot_is_expected_of_two_wheels(drive: Drive) -> None:
-    """A recording of a robot with two wheels has no diagnostics. The rate gets no verdict."""
+    """The report gives no verdict on the rate of odom if no rate is expected.
+
+    This recording has no diagnostics, which would give the expected rate. The robot has two wheels,
+    so the rate of an OmniBot does not apply.
+    """
     drive.statuses.clear()
     drive.joints.values = drive.joints.values[:, :2]
     found = judge(replace(drive.log(), wheels=("left_wheel_joint", "right_wheel_joint")))

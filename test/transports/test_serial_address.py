@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the check of a port's address. The check refuses an address that can never be opened."""
+"""Tests of the check of a port's address. The check rejects an address that can never be opened."""
 
 import os
 from pathlib import Path
@@ -32,7 +32,7 @@ from omnibot_driver.transports.serial_address import check_address
     ],
 )
 def test_a_name_that_is_no_address_is_refused(url: str) -> None:
-    """The port is neither a path nor a URL of pyserial, so it is refused.
+    """A port that is neither a path nor a URL of pyserial is rejected.
 
     The message names the parameter and shows a valid port.
     """
@@ -66,7 +66,7 @@ def test_what_may_appear_later_is_not_refused(url: str) -> None:
 
 
 def test_a_file_and_a_folder_are_refused(tmp_path: Path) -> None:
-    """The path of a folder, of a symbolic link to a folder, or of a file is refused as a port."""
+    """The path of a folder, of a symbolic link to a folder, or of a file is rejected as a port."""
     link = tmp_path / "link"
     link.symlink_to(tmp_path)
     for path in (str(tmp_path), str(link), __file__):
@@ -83,7 +83,7 @@ def test_a_link_whose_device_is_unplugged_is_not_refused(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("url", ["loop://", "rfc2217://localhost:5000"])
 def test_a_port_without_descriptor_is_refused_for_a_board_with_several(url: str) -> None:
-    """For a board with several lines, a port without a file descriptor is refused.
+    """For a board with several lines, a port without a file descriptor is rejected.
 
     The driver polls all lines together, by their descriptors.
     """

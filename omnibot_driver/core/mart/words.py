@@ -187,7 +187,7 @@ KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if 
 
 NEVER_SAID: Final = {
     "F": "the driver uses RM instead, which drives forward and can also turn",
-    "SDR": "limits the distance of a move without a target distance; the driver starts no such move",
+    "SDR": "limits a move without a target distance; the driver never starts such a move",
     "TFSFC": "undocumented; changes the distance from an obstacle at which the robot stops",
     "MNLV": "undocumented; reports a speed from calibration files; the encoder gives a better one",
     "MD": "undocumented; reports a distance that the server computes from time",

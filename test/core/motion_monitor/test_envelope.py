@@ -141,9 +141,10 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """A held robot's wind-up grows by 1.2 times the distance that it falls behind, up to a limit.
+    """A held robot's wind-up grows by 1.2 times the distance that the robot falls behind.
 
-    Normal motion reduces the wind-up.
+    The wind-up is the distance that the robot may catch up later. The wind-up is limited, and
+    shrinks in normal motion.
     """
     wind_up = WindUp()
     for _ in range(10):
@@ -181,10 +182,10 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """The wind-up is the extra distance that a robot may drive after it was held or pushed.
+    """A robot uses up its wind-up by moving faster than its set-points allow.
 
-    If the robot moves faster than its set-points allow, the wind-up shrinks by the extra distance,
-    but not below zero.
+    The wind-up is the extra distance that a robot may drive after it was held or pushed. Each
+    distance beyond the set-points is subtracted from the wind-up, down to zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

@@ -243,11 +243,11 @@ def test_a_loss_that_a_pose_showed_before_a_reset_is_not_motion_after_it() -> No
 
 
 def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> None:
-    """A displacement seems to show a restart of the board, and two later displacements are lost.
+    """The odometry estimates lost motion if poses disprove a suspected restart of the board.
 
-    Two poses then show that the board has not restarted. So the odometry estimates the lost motion.
-    It does not take this motion from the poses, because ``use_board_pose`` is False, but continues
-    the last motion.
+    A displacement seems to show a restart. Two later displacements are lost, and then two poses
+    disprove the restart. ``use_board_pose`` is False, so the odometry does not take the lost motion
+    from the poses. The odometry continues the last motion.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
     attach(odometry, trip.pose)
@@ -268,10 +268,11 @@ def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> 
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_pose_that_disproves_a_restart_also_removes_the_uncertainty_of_it(frame: str) -> None:
-    """A suspected restart that the next pose disproves leaves no uncertainty in the covariance.
+    """A pose that disproves a suspected restart also removes the uncertainty of the suspicion.
 
-    The counter suggests a restart, but the pose still refers to the board's old origin. So the
-    robot did not come to rest unseen, and the pose shows all of its motion.
+    A robot whose board restarts comes to rest unseen, so the suspicion adds uncertainty. Here, the
+    next pose still refers to the board's old origin. So the board has not restarted, and the pose
+    shows all of the robot's motion.
     """
     deviations = []
     for suspected in (False, True):

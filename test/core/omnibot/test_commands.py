@@ -143,7 +143,7 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
 ) -> None:
     """A goal beyond 32.77 m or rad, the limit of a 16-bit word, is rejected.
 
-    With limited values, the robot would drive to another place.
+    If the driver limited the values instead, the robot would drive to another place.
     """
     values = [0.0, 0.0, 0.0]
     values[place] = far

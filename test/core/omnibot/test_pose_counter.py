@@ -90,12 +90,12 @@ def test_a_pose_after_a_long_gap_is_ambiguous_if_both_counters_also_fit_a_restar
 def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
     interrupt: Callable[[Sequence], None],
 ) -> None:
-    """After a gap of 2.1 s, the counters fit both a restart of the board and a loss of frames.
+    """A pose after a gap is ambiguous even if a pause or a reconnection precedes the pose.
 
-    Between the gap and the first pose after it, the board is paused, or the port is opened again.
-    The pose is still ambiguous. If the driver took this pose of a restarted board for a pose of a
-    board that continued, ``odom`` would move to the place where the robot was when the board first
-    started.
+    The board restarts in a gap of 2.1 s, but the counters also fit a mere loss of frames. Before
+    the first pose after the gap, the board is paused, or the port is opened again. The pose refers
+    to the board's new origin. If the driver supposed the old origin, ``odom`` would jump to the
+    place where the board first started.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
@@ -134,11 +134,12 @@ def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
 def test_the_next_count_after_a_silence_may_be_that_of_a_restarted_board(
     restarted: bool, silent_s: float
 ) -> None:
-    """After a silence, a delta has the next count, but a restarted board could have it, too.
+    """A delta that continues the count after a silence still makes the driver suspect a restart.
 
-    The silence lasts 4 s or 7 s. The driver assumes a restart, and marks it as doubtful. The
-    counter of the next pose shows whether the board has restarted or was only silent. The delta
-    counter wraps every 10.24 s. A silence of 7 s is nearer to this time than to 0.
+    A restarted board may have the same count by chance, so the driver marks the restart as
+    doubtful. The counter of the next pose shows whether the board has restarted. After a silence of
+    7 s, the driver also supposes that the delta counter has wrapped, because 7 s is nearer to a
+    wrap, 10.24 s, than to 0.
     """
     uptime = 331 if restarted else 30
     sequence, first_s = counted(uptime), uptime * 0.04 + silent_s
@@ -272,9 +273,10 @@ def test_a_pose_that_comes_first_after_a_reconnection_tells_of_no_losses() -> No
 def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_earlier_losses() -> (
     None
 ):
-    """A pose that is the first frame after a reconnection does not lead to a false restart later.
+    """A reconnection whose first frame is a pose does not make the driver suspect a restart.
 
-    The counter of this pose is ignored, and the next delta shows the losses.
+    Deltas were lost before this pose. The driver ignores the counter of the pose, and the next
+    delta shows the losses.
     """
     sequence, restarts = Sequence(), []
     for count in [*range(25), *range(49, 75)]:

@@ -158,7 +158,7 @@ def test_every_kind_of_frame_and_letter_has_an_example() -> None:
 
 
 def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
-    """The document shows the ten commands of the manual's appendix with the bytes printed there."""
+    """The ten commands of the manual's appendix have the same names and bytes in the document."""
     shown = {example.remark: example.data.hex(" ").upper() for example in EXAMPLES}
     assert {name: shown.get(name) for name in APPENDIX} == APPENDIX
 

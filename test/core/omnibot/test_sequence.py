@@ -83,8 +83,9 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 ) -> None:
     """If a board sends no poses, only a low count after a pause makes the driver suspect a restart.
 
-    A count is low if a restarted board would have lost at most as many deltas as a board that
-    continued. Nothing can disprove a restart, because the board sends no poses.
+    The count shows two numbers of lost deltas: one for a board that has restarted, and one for a
+    board that has continued. The count is low if the first number is not the larger one. No pose
+    can disprove the suspicion later.
     """
     sequence = begun(count)
     sequence.pause()

@@ -41,9 +41,10 @@ def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> N
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """The fitted clock is near the middle of two close bounds, 0.3 ms after the true time.
+    """The fitted clock is near the middle of two close bounds.
 
-    The bounds are 0.1 ms before and 0.8 ms after the true time.
+    The bounds are 0.1 ms before and 0.8 ms after the true time. The fitted clock is 0.3 ms after
+    the true time.
     """
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)

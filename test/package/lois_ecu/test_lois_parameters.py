@@ -10,7 +10,7 @@ from omnibot_driver.core.errors import ParameterError
 
 
 def test_commands_are_slow_in_a_terminal_mode() -> None:
-    """In a terminal mode, a command rate above 25 Hz is refused.
+    """In a terminal mode, a command rate above 25 Hz is rejected.
 
     In this mode, the public firmware forwards each command to a sensor, for example at 4800 baud.
     At a higher rate, a stop would arrive late or never.
@@ -42,10 +42,10 @@ def test_what_the_board_keeps_is_unset_by_default() -> None:
 
 @pytest.mark.parametrize("period_s", [0.0, 0.01, 0.6])
 def test_ticks_are_neither_turned_off_nor_rare(period_s: float) -> None:
-    """The driver refuses a period of the ticks that is 0, too short or too long.
+    """The driver rejects a ``ticks_period`` that is 0, too short or too long.
 
-    Without ticks, nothing confirms a stop. To keep the board's own period, the user omits the
-    parameter.
+    Without the messages that contain encoder ticks, nothing confirms a stop. To keep the board's
+    own period, the user omits the parameter.
     """
     with pytest.raises(ParameterError, match=r"ticks_period' must be 0\.05 to 0\.5 s"):
         PARAMETERS.check_all({"ticks_period": period_s})

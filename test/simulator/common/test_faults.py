@@ -67,10 +67,7 @@ def test_a_flip_changes_one_bit_and_no_length() -> None:
 
 @pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
 def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
-    """A user gives a rate outside 0 to 1.
-
-    The program refuses it, and the message says the range.
-    """
+    """The program rejects a rate outside 0 to 1, and the message says the range."""
     for name, toy in (("lose", toy_lines), ("flip", toy_lines), ("duplicate", toy_udp)):
         with pytest.raises(options.OptionError, match="give a number from 0 to 1"):
             options.from_words([f"--{name}={rate}"], toy)
@@ -78,6 +75,6 @@ def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
 
 @pytest.mark.parametrize("delay", ["-0.1", "61", "nan", "long"])
 def test_a_delay_that_nobody_waits_for_is_refused(delay: str) -> None:
-    """A user gives a delay that is not a number from 0 to 60, in s. The program refuses it."""
+    """The program rejects a delay that is not a number from 0 to 60, in s."""
     with pytest.raises(options.OptionError, match="give seconds from 0 to 60"):
         options.from_words([f"--delay={delay}"], toy_udp)

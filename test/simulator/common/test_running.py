@@ -42,7 +42,7 @@ class Motor:
 class LateBoard(RunningBoard[Motor]):
     """A simulated board whose thread runs late, as on a busy computer.
 
-    During the delay, the board gets the command "stop".
+    During the delay, a stop command arrives at the board.
     """
 
     def __init__(self) -> None:

@@ -49,9 +49,9 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """Other enclaves may use only topics and services of the driver, and topics that all nodes use.
+    """Each node except the driver may use only the driver's topics, and topics that all nodes use.
 
-    Only the operator may call services and publish lift commands.
+    Only the operator's node may call the driver's services and publish lift commands.
     """
     every = rules()
     driver = every.pop("/omnibot/driver")

@@ -35,7 +35,7 @@ def driver(ecu: Ecu) -> Iterator[Driver]:
 def new(
     firmware: str, stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> tuple[Ecu, Driver, Probe]:
-    """A simulated ECU with this firmware, a driver, and a probe. Each test gets new ones."""
+    """Return a new simulated ECU with the firmware ``firmware``, a new driver and a new probe."""
     ecu = ecu_of(firmware, stack)
     driver: Driver = start_driver(ecu.path, board="lois_ecu")
     probe: Probe = probe_of(driver)

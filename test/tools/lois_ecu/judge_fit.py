@@ -2,12 +2,12 @@
 
 """Judge how well the tool finds and tunes the unknown motors of random robots.
 
-Run this by hand. The arguments are the number of robots and, optionally, the seed of the first
-robot. Each wheel takes 10 s:
+Run this by hand. This command judges 20 robots:
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_fit.py 20
 
-No driver runs. The steps come from the simulated board with the public firmware.
+An optional second argument is the seed of the first robot. Each wheel takes 10 s. No driver runs.
+The steps come from the simulated board with the public firmware.
 """
 
 import sys
