@@ -2,8 +2,7 @@
 
 """Tests of the sum of the delays of all samples, each from sampling to reading.
 
-The board's texts are no samples, and add nothing to the sum. The time of a pause adds nothing
-either.
+The sum contains neither the board's texts, which are not samples, nor the time of a pause.
 """
 
 import pytest
