@@ -42,7 +42,7 @@ After the calibration, the board subtracts the bias itself. The driver must not 
 
 
 class FejemisCommands:
-    """The services and topics that give commands only to a Fejemis.
+    """The services and topics for commands that only a Fejemis has.
 
     * ``values``: the parameter values. The owner replaces them when the user sets a parameter.
     * ``publish``: for each type of reading, the function that handles such a reading. The only type

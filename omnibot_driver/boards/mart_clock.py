@@ -23,7 +23,7 @@ def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     ``now_s``: present time in s since 1970.
 
     ``may_set_back``: whether TIME may set the controller's clock back. If not, the result is None
-    until the minute is nearly over (``ENDS_S``), and TIME must wait.
+    except at the end of a minute (``ENDS_S``): TIME then sets the clock to the next full minute.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):
