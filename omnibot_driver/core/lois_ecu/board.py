@@ -283,9 +283,10 @@ class LoisEcuBoard(Board):
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Request a record. A later reading contains the record, or the reason why there is none.
+        """Request a record of ``samples`` samples, for example of times between ticks.
 
-        Raises RequestRefused, for example for a record that is too long, or in a terminal mode.
+        A later reading contains the record, or the reason why there is none. Raises RequestRefused,
+        for example for a record that is too long, or in a terminal mode.
         """
         self._ecu.record(kind, samples)
 

@@ -30,11 +30,11 @@ class Coasting:
     speed_mps: float
 
     def unsure_mps(self, now: float, step_s: float) -> float:
-        """Return the speed's error at ``now``: one standard deviation, with the sign of the speed.
+        """Return the speed's standard deviation at ``now``, in m/s, with the sign of the speed.
 
-        The standard deviation is half the difference between the speeds of two imagined wheels. The
-        first wheel decelerates fast, and begins at once. The second wheel decelerates slowly, and
-        begins only after ``step_s``, the period of the speed controller in s.
+        The standard deviation is half the difference between two estimates of the speed. The lower
+        estimate assumes a fast deceleration that begins at once. The higher one assumes a slow
+        deceleration that begins after ``step_s``, the period of the speed controller in s.
         """
         age_s = now - self.heard_s
         slow_mps = self._speed_after((1 + COAST_PART) * age_s)

@@ -60,9 +60,10 @@ LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """Limits for the difference between a value in the board's odometry and the expected value.
 
-``LEAP`` is in standard deviations, ``LEAP_M`` in m at the rims. A heading is ignored if its
-difference exceeds both limits: the board has computed such a heading from an outdated wheel speed.
-A distance is ignored if its difference exceeds ``LEAP``.
+``LEAP`` is in standard deviations. ``LEAP_M`` is in m: a heading is compared as the difference of
+the two wheels' distances. A heading is ignored if its difference exceeds both limits: the board has
+computed such a heading from an outdated wheel speed. A distance is ignored if its difference
+exceeds ``LEAP``.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -73,8 +74,8 @@ SWINGING_M: Final = 0.055
 SWERVED_M: Final = 0.05
 """Standard deviation, in m, of the errors of the robot's x and y after a wheel has rolled 1 m.
 
-These errors arise only while the wheel's speed oscillates and the board does not count the wheel's
-ticks. The error of the wheel's distance in this case is ``SWINGING_M``.
+These errors are added only at an oscillating speed, and without counted ticks. ``SWINGING_M`` is
+the error of the wheel's distance.
 """
 LOST_PART: Final = (0.15, 0.35)
 """Standard deviation of the distance that a wheel rolled while reports were lost, as a fraction of
@@ -85,8 +86,8 @@ CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
 """Factor for the error that remains after a report has corrected a wheel's distance.
 
-The standard deviation of the error is the factor times the part of the correction above
-``CORRECTED_TICKS`` (in ticks). Only for a wheel without counted ticks.
+A correction of more than ``CORRECTED_TICKS`` (in ticks) leaves an error. Its standard deviation is
+the factor times the excess. Only for a wheel without counted ticks.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -128,8 +129,8 @@ class Comparison:
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
-        Also return whether the difference is too large for an error of the filter. While the board
-        does not count, the difference is 0.
+        Also return whether the difference is too large for an error of the motion filter. While the
+        board does not count, the difference is 0.
 
         ``late_s``: how much later than usual the report arrived.
         """
@@ -242,15 +243,15 @@ class Comparison:
     def came_to_rest(self, index: int) -> None:
         """Record that a wheel is at rest, and correct the estimate of the wheel's distance.
 
-        The driver subtracts the distance that it has added since the wheel's motion was last
-        certain. ``index``: 0 left, 1 right.
+        The driver subtracts the distance since the wheel's last certain motion. ``index``: 0 left,
+        1 right.
         """
         self._speeds[index].come_to_rest()
 
     def _equal(self, told: Told, shown: tuple[float, float]) -> bool:
         """Return whether both wheels have the same speed.
 
-        For equal speeds, the board's odometry shows the speed zero instead of these speeds.
+        In this case, the board's odometry shows the speed zero for both wheels.
         ``shown``: for each wheel, the estimate of its last measured speed, in m/s.
         """
         left, right = (wheel.course.measured_sign for wheel in self._motion.wheels)

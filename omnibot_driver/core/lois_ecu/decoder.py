@@ -56,7 +56,7 @@ class LoisDecoder:
         self._cut_bytes = 0
         """Number of bytes of the current line that were already discarded."""
         self._doubted = 0
-        """Number of the next lines without a checksum that are discarded."""
+        """How many of the next lines without a checksum will be discarded."""
 
     @property
     def statistics(self) -> DecoderStatistics:

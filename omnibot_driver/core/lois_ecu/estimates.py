@@ -89,7 +89,7 @@ class Estimates:
     ) -> FusedOdometry:
         """Return the estimate at ``stamp_s``, without an effect on later estimates.
 
-        * ``unheard_s``: time in s from the filter's state to ``stamp_s``.
+        * ``unheard_s``: time in s from the time of the filter's state to ``stamp_s``.
         * ``may_roll_mps``: greatest possible speed of each wheel in this time, in m/s.
         """
         motion = self._motion

@@ -60,7 +60,7 @@ class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
     Call ``look`` with all received bytes. After each read that contains reports, call
-    ``understood``, and ``heard`` with these reports.
+    ``understood()``, and pass the reports to ``heard``.
 
     * ``advice``: what the user should check, or None.
     * ``no_ticks``: whether the board sends reports, but no ticks.

@@ -80,8 +80,8 @@ class MotionFilter:
         """Smallest estimated difference (m/s) between the two wheel speeds measured by the board.
 
         The value covers the time since the board's distance was last compared with the estimated
-        distance. While both speeds are equal, the public firmware does not update its position. So
-        after a small difference, the board's distance may be too short.
+        distance. If the value is small, the speeds may have been equal. The public firmware does
+        not update its position then, so the board's distance may be too short.
         """
         self.speed_errors = SpeedErrors(self)
         self.history = FilterHistory(self.filter)

@@ -53,9 +53,11 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether an estimate has been made since the odometry's time last advanced. If True, the
-        next advance sets the wheels' ``blind`` flags (motion without counted ticks) to False. The
-        flags stay until then: an odometry report in the same read can still correct the motion.
+        """Whether an estimate has been made since the odometry's time last advanced.
+
+        After an estimate, the wheels' ``blind`` flags (motion without counted ticks) stay until the
+        time advances: an odometry report in the same read can still correct the motion. The advance
+        then sets the flags to False.
         """
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
@@ -160,9 +162,10 @@ class LoisOdometry:
         return any(sure and abs(count) >= least for count, sure in found)
 
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
-        """Add an error to each wheel's distance, because the board may have restarted unnoticed.
+        """Make each wheel's distance less certain: the board may have restarted unnoticed.
 
-        The error is the difference between the reported and the expected tick count.
+        The added standard deviation is the difference between the reported and the expected tick
+        count.
 
         ``late_s``: how much later than usual the ticks arrived.
         """

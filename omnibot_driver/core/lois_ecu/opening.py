@@ -41,8 +41,8 @@ LINE_S: Final = 0.02
 # the end of another line could form a motion command. Even the beginning of a Stop is dangerous:
 # with the end of a setting, it could command full duty.
 AFTER_SET_POINT_S: Final = 0.015
-"""Shortest time in s from a set-point to a setting, and from a motion command to a *side command*.
-A side command, for example for the LED, is neither a set-point nor a setting."""
+"""Shortest time in s from any set-point to a setting, and from a set-point other than zero to a
+*side command*. A side command, for example for the LED, is neither a set-point nor a setting."""
 LONGEST_WAIT_S: Final = 0.5
 """Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
 may be due each time that a setting could be sent."""
@@ -65,9 +65,9 @@ RECOVER_AFTER_S: Final = 3.0
 boot, which takes two seconds."""
 UNANSWERED_S: Final = 5.0
 """Time in s without the requested GPS date after which the driver restores the board's mode. If the
-board sends reports but no date, it may not obey requests. Writing the settings again may not help:
-after ``ROUNDS`` rounds, the driver does so only when tick reports arrive, and a bad line may lose
-these reports."""
+board sends reports but no date, it may not obey requests. The driver cannot rely on writing the
+settings again: after ``ROUNDS`` rounds, it writes them only after a tick report, and a bad line may
+lose all tick reports."""
 RESYNC: Final = b"::"
 """Two extra colons between a line with a checksum and a line without. A board that expects no
 checksums stores the surplus characters of the first line until the next ``:``. If the ``:`` of the
@@ -86,7 +86,10 @@ class SettingsWriter:
         self._points = points
         self._in_period = self._answered = False
         self.unanswered_since_s = math.inf
-        """Time in s of the last ``begin``; infinity once a date has arrived since then."""
+        """Time in s since which the board has sent no GPS date: the last call of ``begin``.
+
+        Infinity once a date has arrived.
+        """
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
         """Commands that are not settings, for example for the LED. Each has the earliest time at
@@ -134,9 +137,8 @@ class SettingsWriter:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
         While the robot drives, the driver writes all settings at most ``ROUNDS`` times, because
-        each written gain resets the controller of a wheel. The driver still sends the commands that
-        are already queued, because a command that was sent may have overwritten a setting that a
-        queued command restores.
+        each written gain resets the controller of a wheel. The driver completes a round that has
+        begun, because a later command of the round may restore what an earlier one has overwritten.
         """
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
@@ -261,10 +263,10 @@ class SettingsWriter:
 
         Two commands are exceptions:
 
-        * A terminal mode is sent in two lines while the settings are unconfirmed, and after
-          ``repeat``. The first line has a checksum, because a board that has just booted obeys only
-          such lines; the second line has none. If no motion is commanded, a Stop is added, because
-          the board may have ignored the earlier Stops.
+        * A terminal mode is sent in two lines while the settings are unconfirmed, and after a call
+          of ``repeat``. The first line has a checksum, because a board that has just booted obeys
+          only such lines; the second line has none. If no motion is commanded, a Stop follows,
+          because a board that expected checksums has ignored the earlier Stops.
         * Stop never has a checksum (see ``_begin_round``).
         """
         if command == outbound.STOP:
@@ -281,11 +283,10 @@ class SettingsWriter:
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
 
         Another program may have switched the board's checksums off while the robot rolls. The board
-        then ignores a Stop with a checksum. So while the settings are unconfirmed, the driver sends
-        a Stop without a checksum: at the beginning of each of the first ``ROUNDS`` rounds, or, with
-        ``checksum: false``, after each terminal mode (see ``_encoded``). A Stop with a checksum
-        would be dangerous: if two of its zeros were lost, the board would read its checksum as a
-        duty.
+        then ignores a Stop with a checksum. So while the settings are unconfirmed, each of the
+        first ``ROUNDS`` rounds begins with a Stop without a checksum. With ``checksum: false``, a
+        Stop follows each terminal mode instead (see ``_encoded``). A Stop with a checksum would be
+        dangerous: if two of its zeros were lost, the board would read its checksum as a duty.
         """
         if self._queue or not self._rounds_left:
             return

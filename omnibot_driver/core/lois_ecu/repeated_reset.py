@@ -69,13 +69,13 @@ class RepeatedReset:
         return data
 
     def give_up(self) -> None:
-        """End the reset. It is not repeated, and no reading reports it."""
+        """End the reset of the board: do not repeat it, and do not return a ResetReading for it."""
         self._proof, self.again_at_s = None, math.inf
 
     def readings(self) -> list[Reading]:
-        """Return a ResetReading if the latest tick counts show the reset; otherwise nothing.
+        """Return a ResetReading if new tick counts show that the board was reset; otherwise none.
 
-        When tick counts show the reset for the first time, also write the settings again.
+        When tick counts show this reset for the first time, also write the settings again.
         """
         proof, known = self._proof, self._ecu.translation.counts
         if proof is None or known.last is None or known.last is self._seen:

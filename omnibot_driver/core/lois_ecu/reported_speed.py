@@ -33,9 +33,9 @@ speed to the next, in ``duration`` s. After a larger change, the speed is reject
 noticed a tick late, and so has measured a wrong speed."""
 FIRST_RPM: Final = 8.0
 FIRST_PART: Final = 2.0
-"""Terms of the largest plausible first speed that the board reports of a wheel that starts.
+"""``FIRST_RPM + FIRST_PART * expected``: largest plausible first speed of a starting wheel, in RPM.
 
-The limit in RPM is FIRST_RPM plus FIRST_PART times the expected speed in RPM.
+If the board reports a larger first speed, it is rejected. ``expected``: the expected speed in RPM.
 """
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
@@ -216,10 +216,10 @@ class ReportedSpeed:
                 self._doubt_rolling(resting.chance)
 
     def _doubt_rolling(self, chance: float) -> None:
-        """Add an error to the distance of a wheel that is estimated as rolling, but may be at rest.
+        """Make the distance of a wheel less certain, because the wheel may be at rest.
 
-        In total, the standard deviation of the added errors is ``chance`` times the distance since
-        the reported speed last changed. The board's odometry (0x20) does not show these errors.
+        In total, the added standard deviation is ``chance`` times the estimated distance since the
+        reported speed last changed. The board's odometry (0x20) cannot correct this error.
 
         ``chance``: probability that the wheel is at rest.
         """
