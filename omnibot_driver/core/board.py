@@ -75,7 +75,8 @@ class ReadingClock(Protocol):
         """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
         * ``now``: time that was passed to that call.
-        * ``edge``: value of ``Board.edge`` after that call.
+        * ``edge``: place in the stream of IMU samples at which the read ended (``Board.edge`` after
+          that call), or None.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:

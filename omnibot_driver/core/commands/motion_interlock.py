@@ -72,12 +72,12 @@ class MotionInterlock:
             self.until = Until.NOTHING
 
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
-        """Postpone the end of a refusal of motion until ``timeout_s`` from now.
+        """Restart the time without commands, ``timeout_s`` (s), after which a refusal ends.
 
-        The refusal ends when no command has come for ``timeout_s`` (s). Only a refusal after the
-        motion monitor's first stop ends in this way. Call this method after a refused command, and
-        after a stall of ``stalled_s`` (s), because commands may have arrived unnoticed during the
-        stall. If the refusal should have ended before the stall, this method ends the refusal.
+        Call this method after a refused command, and after a stall of ``stalled_s`` (s), because
+        commands may have arrived unnoticed during the stall. A refusal whose time was over before
+        the stall ends at once. A refusal after the motion monitor's second stop within 60 s has no
+        such time.
         """
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now

@@ -272,7 +272,8 @@ class CommandPipeline:
     def end_goal(self, now: float) -> list[str]:
         """Drop the goal or the docking after a refused zero ``cmd_vel``; return notices.
 
-        The goal stays if the board's control switch does not permit velocities.
+        The goal stays if the board's control switch is set to position control, because ``cmd_vel``
+        then has no effect.
         """
         goal = isinstance(self.policy.current, GoalSetpoint)
         motion = "goal" if goal else self._board.own_motion

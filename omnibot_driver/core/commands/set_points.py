@@ -51,7 +51,7 @@ class Setpoint(Protocol):
 
     @property
     def settled(self) -> bool:
-        """Whether ``order`` will return the same order at all later times."""
+        """Whether the order no longer changes with time."""
 
     @property
     def final(self) -> Order:
@@ -134,7 +134,7 @@ class SteadySetpoint:
         self.is_zero = is_zero(order)
 
     def order(self, now: float) -> Order:
-        """Return the motion order to send to the board. The order is the same at all times."""
+        """Return the motion order to send to the board. The order never changes."""
         return self._order
 
     def check_anew(self) -> None:
@@ -151,10 +151,10 @@ class GoalSetpoint:
       discarded.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
-    * ``before``: the previous command, or None. Each goal stores the smallest distance and angle to
-      the goal that the robot has reached. If ``before`` is a goal too, the new goal starts with the
-      stored values of ``before``, plus the distance and angle between the two goals. So a
-      repetition of the goal changes nothing.
+    * ``before``: the previous command, or None. ``is_left_by`` compares the robot's pose with the
+      smallest distance and angle to the goal so far. If ``before`` is a goal, the new goal takes
+      over these two values, plus the distance and angle between the two goals. So a repetition of
+      the goal changes nothing.
     """
 
     authority: Final = Authority.POSE
@@ -183,7 +183,7 @@ class GoalSetpoint:
         self.check_anew()
 
     def order(self, now: float) -> Order:
-        """Return the motion order to send to the board. The order is the same at all times."""
+        """Return the motion order to send to the board. The order never changes."""
         return self._order
 
     def check_anew(self) -> None:

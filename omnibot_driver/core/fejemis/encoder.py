@@ -114,7 +114,7 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist of the robot's body that the sent ``packets`` command.
+        """Return the twist that the sent ``packets`` give to the robot's body.
 
         Call this method once after each ``encode``, with the returned packets. Without a preceding
         ``encode``, or with other packets, the method returns a standstill.

@@ -119,8 +119,8 @@ class Half:
     def unsure(self) -> bool:
         """Whether the board may have restarted and lost the user's settings.
 
-        The value becomes True when the data stream that driving requires stops, and False with the
-        next heartbeat.
+        The value becomes True when the board stops sending the data that driving requires, and
+        False with the next heartbeat.
         """
         return self._unsure_at is not None
 

@@ -120,8 +120,7 @@ class ImuSamples:
         The new phase is as late as possible, except that the sampling time of a recent sample must
         not be after its arrival.
 
-        ``delay_s``: time in s from the new sample's sampling time, with the old phase, to its
-        arrival.
+        ``delay_s``: time in s from the sampling to the arrival of the new sample, by the old phase.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

@@ -35,16 +35,16 @@ After a longer time, lines may be missing, so new pairs of lines wait for the ne
 shows that lines are missing, these pairs are rejected.
 """
 WARY_S: Final = 1.0
-"""Time in s after a stall of the driver in which new pairs must wait for the next pose: the
-kernel's buffer may have overflowed and lost lines.
+"""Time in s after a stall of the driver in which new pairs of lines wait for the next pose.
+
+The kernel's buffer may have overflowed. The next pose shows whether lines are missing.
 """
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""Limits, in s, for the magnitude of the sum ``_evidence_s``, a difference of time intervals.
+"""``KNOWN_S``, ``SUREST_S``: limits, in s, for the magnitude of ``_evidence_s``.
 
-The sign of the sum shows whether the gyro line or the acceleration line of a sample comes first.
-``KNOWN_S``: smallest magnitude from which the sign is used. ``SUREST_S``: the sum is limited to
-this magnitude.
+The sign of ``_evidence_s`` shows whether the gyro line or the acceleration line of a sample comes
+first. The sign is used from the magnitude ``KNOWN_S`` on. The magnitude is limited to ``SUREST_S``.
 """
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to the interval between a gyro and an acceleration line if another line
@@ -59,7 +59,8 @@ At this limit, ``ImuPairs`` decides which line of a sample comes first, even if 
 MOST: Final = 10
 """Limit for the magnitude of each counter in ``_outside``. At this limit, a counter stops.
 
-The sign of a counter shows whether a kind of line comes between pairs or within a pair.
+A counter is positive if a kind of line usually comes between two pairs of a gyro and an
+acceleration line, and negative if it usually comes between the two lines of a pair.
 """
 UNPOSED: Final = 20
 """Limit for the number of gyro lines, and of acceleration lines, since the last pose.
@@ -118,9 +119,11 @@ class ImuPairs:
         self._between: set[str] = set()
         """The kinds of lines that arrived since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """For each kind of line, except gyro and acceleration lines: a counter that shows where
-        lines of this kind usually come. The counter is positive if they come between two pairs of a
-        gyro and an acceleration line, and negative if they come within a pair."""
+        """A counter for each kind of line, except gyro and acceleration lines.
+
+        The counter is positive if lines of this kind usually come between two pairs of a gyro and
+        an acceleration line, and negative if they usually come between the two lines of a pair.
+        """
         self._skipped = 0
         self._silent = False
         """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines.
@@ -149,9 +152,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line. ``kind``: its keyword.
 
-        If a pair waits for its second line at this moment, ``kind`` decides. If lines of this kind
-        usually come within a pair, the pair waits on. Otherwise, the second line is regarded as
-        lost.
+        If a pair still waits for its second line, and lines of this ``kind`` do not usually come
+        between the two lines of a pair, the second line is regarded as lost.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:

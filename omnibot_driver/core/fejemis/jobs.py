@@ -62,9 +62,9 @@ reports the offsets."""
 
 
 def whole_seconds(delay_s: float) -> int:
-    """Return the delay in whole seconds, at least 1.
+    """Return the delay of a power-off in whole seconds, at least 1.
 
-    The delay is increased until the checksum detects the loss of any two of its digits.
+    If the checksum would not detect the loss of two digits of the delay, the delay is increased.
     """
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
@@ -119,7 +119,7 @@ class Jobs:
         """Begin a job after ``wait_s`` seconds. Raises RequestRefused while another job runs.
 
         * ``token``: identifies the job in its result.
-        * ``delay_s``: time in s until a power-off.
+        * ``delay_s``: time in s until the board cuts the power; only for ``Job.POWER_OFF``.
         """
         if self.job is not None:
             raise RequestRefused(
@@ -284,8 +284,9 @@ class Jobs:
 def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    ``eer`` loads a configuration; the boards do not answer it. Some front boards do not know the
-    query ``fwoi``: their answer "unhandled" is accepted too.
+    ``eer`` loads a configuration; the boards do not answer it. So the driver then sends a query:
+    ``confi`` to the drive board, ``fwoi`` to the front board. Some front boards do not know
+    ``fwoi``: their answer "unhandled" is accepted too.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

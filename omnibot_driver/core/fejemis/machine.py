@@ -28,8 +28,9 @@ Of several commands in this time, only the newest is sent. A stop of the lift is
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
-"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage. The checksum
-detects damage only in some texts of the voltage, so the driver may send a lower voltage.
+"""Smallest voltage that is sent to the lift, as a fraction of the commanded voltage.
+
+In some voltages, the checksum cannot detect all damage. The driver then sends a lower voltage.
 """
 LEAST_TIME_S: Final = 0.04
 
@@ -161,8 +162,8 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The checksum detects damage only in some texts of the voltage. So the line may have a lower
-    voltage, but at least ``LEAST_PART * volts``.
+    In some voltages, the checksum cannot detect all damage. The line then contains a lower voltage,
+    but at least ``LEAST_PART * volts``.
     """
     if not volts:
         return OFF[0], 0.0

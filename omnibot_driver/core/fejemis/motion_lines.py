@@ -31,11 +31,9 @@ ANGLE_COST: Final = 1e4
 factor of 2.7 (e) costs 1.
 """
 SLOWEST: Final = 30.0
-"""The linear speed in the drive board's line is 0, or at least the outer wheel's speed divided by
-``SLOWEST``.
+"""Largest ratio of the outer wheel's speed to the linear speed in the drive board's line.
 
-A line for backward motion cannot contain the linear speed 0, because the sign of this speed gives
-the direction.
+The linear speed may also be 0, except for backward motion, which needs the minus sign.
 """
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.

@@ -16,7 +16,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 DRAWN: Final = 0.25
 """Factor by which the driver corrects the wheels' motion towards a new pose.
 
-The correction is this factor times the difference between the wheels' motion and the way to the
+The correction is this factor times the difference between the wheels' motion and the motion to the
 pose. The factor applies if rounding of the pose can explain the difference.
 """
 ROUNDINGS: Final = 1.5
@@ -56,10 +56,9 @@ AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
 """``AGAIN_M``, ``AGAIN_RAD``: tolerances, in m and rad, between poses and the wheels' motion.
 
-Between two rejected poses, the board may have moved the origin of its poses to the robot. The
-driver assumes this if two conditions are true. First, the motion from the first to the second pose
-differs from the wheels' motion by more than a tolerance. Second, distance and angle from zero to
-the second pose are at most those of the wheels' motion plus the tolerances.
+If the board sets its pose to zero between two rejected poses, the difference of the poses
+contradicts the wheels' motion, and the second pose is not farther from zero than the wheels have
+moved. The driver makes both comparisons with these tolerances.
 """
 LONGEST_JUMP_S: Final = 0.2
 """Longest time, in s, for which the driver trusts the wheel speeds more than the poses.
@@ -103,13 +102,12 @@ class PoseOdometry:
         self._driven: Pose | None = None
         """Motion from the last accepted pose to the last rejected pose; None while it is unknown.
 
-        The motion to the first rejected pose is computed from the wheel speeds. For each further
-        rejected pose, the motion from the rejected pose just before is added: the difference of the
-        two poses. If the wheel speeds show that the coordinate frame may have moved between the two
-        poses, the motion by the wheel speeds is added instead.
+        The wheel speeds give the motion to the first rejected pose. Each further rejected pose adds
+        its difference from the rejected pose before it. If the coordinate frame may have moved
+        between these two poses, the motion by the wheel speeds is added instead.
 
-        If the value is not None, the wheel speeds contradict the first rejected pose, so the
-        rejected poses may be in a new coordinate frame.
+        The value is known only if the wheel speeds contradict the first rejected pose. The rejected
+        poses may then be in a new coordinate frame.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
@@ -231,9 +229,8 @@ class PoseOdometry:
         ``pose``: the first rejected pose after the accepted one. ``since_s``: time in s since the
         accepted pose.
 
-        Return None if the wheel speeds are unknown. Also return None if the poses are rounded so
-        coarsely that rounding may explain the rejection: such a pose does not show a new coordinate
-        frame.
+        Return None if the wheel speeds are unknown, or if rounding of the poses may explain the
+        rejection. Otherwise, the rejection may mean that the board uses a new coordinate frame.
         """
         assert self._pose is not None
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)

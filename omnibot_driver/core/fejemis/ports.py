@@ -77,7 +77,8 @@ class Ports:
         """Find out which board is at which port. Call this after a heartbeat.
 
         Return whether the two boards have exchanged their ports since both boards were last known.
-        Before that, the drive board is expected at the first port.
+        When both boards become known for the first time, return whether the drive board is at the
+        second port.
         """
         first, second = (half.role for half in self.halves)
         if first == second:

@@ -21,10 +21,10 @@ STILL_ALIGNED_RAD: Final = math.radians(10.0)
 angle, in rad, at which a turn on the spot may begin, and may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Angle, in rad, that limits the error of the body's velocity while the front wheel turns.
+"""Angle, in rad, that sets the tolerance of the body's velocity while the front wheel turns.
 
-The largest allowed error, in m/s, is the commanded speed at the front wheel times the sine of this
-angle. The robot drives so slowly that the error does not exceed this limit.
+The tolerance, in m/s, is the commanded speed at the front wheel times the sine of this angle. The
+robot drives slowly enough to stay within the tolerance.
 """
 
 

@@ -151,8 +151,8 @@ class TeensyClock:
     def _began_late(self, board_s: float, now: float) -> bool:
         """Begin the clock anew if the clock began with a line that arrived late.
 
-        Three (``AGAIN``) lines show this: each line seems to arrive early by the clock, and the
-        board times of the lines agree with each other. Return whether the clock has begun anew.
+        By such a clock, later lines seem to arrive early. Three (``AGAIN``) early lines are
+        necessary, with board times that agree. Return whether the clock has begun anew.
         """
         agree = all(
             before_s < board_s
@@ -213,8 +213,7 @@ class StampedReadings:
     ) -> list[float]:
         """Return the timestamps of the readings that were added with ``add``.
 
-        If the length of ``readings`` is not the number of added readings, return ``now`` for each
-        reading.
+        ``readings``: the added readings. If their number is wrong, each gets the timestamp ``now``.
         """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 

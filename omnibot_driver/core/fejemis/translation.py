@@ -149,9 +149,10 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add waiting IMU samples and orientations to the readings, up to the first doubtful one.
+        """Add waiting IMU samples and orientations to the readings until a sample is doubtful.
 
-        Call this method after a pose and at the end of a read.
+        A doubtful sample waits for the next pose, which shows whether lines are missing. Call this
+        method after a pose and at the end of a read.
         """
         for item in self._pairs.take():
             if isinstance(item, Pair):

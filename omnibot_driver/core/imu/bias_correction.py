@@ -56,7 +56,7 @@ class BiasCorrector:
         self._correction = correction
 
     def corrected(self, content: object) -> object:
-        """Return ``content`` minus the biases if it is an orientation with a sample of the IMU.
+        """Return ``content`` minus the IMU's biases if it is an OrientedImuReading.
 
         Return any other content as it is.
         """
