@@ -13,17 +13,17 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 # A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
 FEW_TURNS: Final = 0.3
 FEW_TICKS: Final = 2
-"""Largest count that is regarded as near zero: ``FEW_TURNS`` turns of a wheel, plus ``FEW_TICKS``
-ticks. A stopped wheel is assumed to roll at most this far."""
+"""``FEW_TURNS`` (turns of a wheel) plus ``FEW_TICKS`` (ticks): largest count that is regarded as
+near zero. A stopped wheel is assumed to roll at most this far."""
 JUMP_TURNS: Final = 0.95
 JUMP_TICKS: Final = 3
-"""Smallest fall of a count to near zero that proves a reset: ``JUMP_TURNS`` turns of a wheel, plus
-``JUMP_TICKS`` ticks. No wheel can roll as far between a reset and the next counts."""
+"""``JUMP_TURNS`` (turns of a wheel) plus ``JUMP_TICKS`` (ticks): smallest fall of a count to near
+zero that proves a reset. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""Limit for the tick counts of a robot at rest: ``STEADY_TURNS`` turns of a wheel, plus
-``STEADY_TICKS`` ticks. If a count was at least this limit, and the counts of both wheels are zero
-now, the board has obeyed a reset. Backlash changes a count by less than this limit."""
+"""``STEADY_TURNS`` (turns of a wheel) plus ``STEADY_TICKS`` (ticks): smallest count of a wheel at
+rest from which a fall to zero proves a reset. The new count of the other wheel must be zero too.
+Backlash changes a count by less than this limit."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""
@@ -48,9 +48,9 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver sends the reset again.
 
-        ``before``: the last tick counts before this repetition. The proof uses ``before`` instead
-        of earlier counts if the wheels are at rest (``steady`` is True), and a fall of ``before``
-        to zero would prove a reset.
+        ``before``: the last tick counts before this repetition. These counts replace the earlier
+        ones if the wheels are at rest (``steady``), and one count is large enough for a proof (see
+        ``STEADY_TICKS``).
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

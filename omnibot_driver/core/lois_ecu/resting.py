@@ -2,8 +2,7 @@
 
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-The public firmware repeats the last speed of a stopped wheel: usually 5 to 17 RPM, after a higher
-speed.
+When a wheel stops, the public firmware keeps reporting the wheel's last speed, usually 5 to 17 RPM.
 
 This module works on reported speeds and the time between them.
 """
@@ -14,8 +13,8 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the last speed that the board measures before a
-wheel stops. Below the range, the wheel is starting; above it, the wheel still rolls."""
+"""``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the speed that the board reports for a wheel at
+rest. A wheel with a lower reported speed is starting; a wheel with a higher one still rolls."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -54,8 +53,7 @@ least ``FELL_RPM``:
 * ``FAR``: after a fall by at least ``FELL_FAR_RPM``.
 * ``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
 * ``NEAR``: after a fall by less than ``FELL_FAR_RPM``.
-* ``FELL_IN_GAPS``: while reports are lost, after a fall by less than ``FELL_FAR_RPM``, or after a
-  fall from a speed that was reported only once.
+* ``FELL_IN_GAPS``: instead of ``LONE`` and ``NEAR``, while reports are lost.
 * ``GAPS``: while reports are lost, without a reported fall.
 * ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. The wheel rolls
   on, unless a late tick has made the speed wrong.
@@ -83,7 +81,8 @@ class RestingWheel:
         self._gaps = False
         """Whether reports were being lost when the reported speed last changed.
 
-        It is always False if the user has set the controller's gains.
+        If the user has set the controller's gains, the value is always False, so that ``GAPS`` is
+        not used.
         """
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0

@@ -17,11 +17,12 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm, Stream
 from omnibot_driver.core.lois_ecu.settings import BOOT_PERIOD_MS, LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Shortest time in s from a Stop until RPM 0/0 is sent. Until then, the tick counts can show the
-standstill; RPM 0/0 ends the counting."""
+"""Shortest time in s from a Stop until RPM 0/0 is sent. RPM 0/0 clears the firmware's measured
+speed, but ends the counting of ticks, which must show the standstill first."""
 CLEAR_AFTER_TICKS: Final = 6
-"""Shortest time from a Stop until RPM 0/0 is sent, in periods of the tick reports. Until
-then, these reports can show the standstill; RPM 0/0 ends the counting of ticks."""
+"""Shortest time from a Stop until RPM 0/0 is sent, in periods of the tick reports. RPM 0/0 clears
+the firmware's measured speed, but ends the counting of ticks, which must show the standstill
+first."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
@@ -30,8 +31,8 @@ class SetPoints:
 
     * ``saturated``: number of commands that were slowed, because a value was above its limit.
     * ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-      none was sent. RPM 0/0 is due at least ``CLEAR_AFTER_S`` after this time. To repeat RPM 0/0,
-      the method ``clears`` sets ``stopped_at_s`` to a later time.
+      none was sent. RPM 0/0, which clears the firmware's measured speed, is due at least
+      ``CLEAR_AFTER_S`` later. To repeat RPM 0/0, ``clears`` sets ``stopped_at_s`` to a later time.
     * ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
     * ``moved_at_s``: time of the last motion command.
     * ``said_at_s``: time of the last set-point, also of a zero one.
@@ -78,7 +79,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` return RPM 0/0 before the next set-points, just like after a Stop."""
+        """Plan RPM 0/0 before the next motion, so that the firmware forgets its measured speed."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

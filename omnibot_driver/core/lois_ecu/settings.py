@@ -54,5 +54,5 @@ class LoisEcuSettings:
 
     @property
     def tick_m(self) -> float:
-        """Distance in m that a wheel rolls in one tick."""
+        """Distance in m that a wheel rolls per encoder tick."""
         return 6.283185307179586 * self.wheel_radius_m / self.ticks_per_revolution

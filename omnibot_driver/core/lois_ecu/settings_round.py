@@ -23,11 +23,11 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
-"""Limit, in ms, for the period of the tick reports. Each of the first ``ROUNDS`` rounds of settings
-writes a period up to this limit; fewer rounds write a longer period. Each write restarts the period
-on the board. Up to this limit, the writes delay the next tick report by less than 1 s."""
+"""Longest period of the tick reports, in ms, that each of the first ``ROUNDS`` rounds of settings
+writes. Fewer rounds write a longer period: each write restarts the period on the board, so too many
+writes could delay the next tick report by 1 s or more."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
-"""Value of the left short correction in the public firmware after a boot."""
+"""Value of the setting LEFT_SHORT_CORRECTION in the public firmware after a boot."""
 
 
 def slow_ticks(settings: LoisEcuSettings) -> bool:
@@ -53,7 +53,7 @@ def sets_ticks(command: Command) -> bool:
 
 
 def left_short_correction(settings: LoisEcuSettings) -> WriteSetting:
-    """Return the command that writes the left short correction, which the terminal mode overwrites.
+    """Return the command that writes LEFT_SHORT_CORRECTION, which the terminal mode overwrites.
 
     If the user has not set it, the command writes the value that the board has after a boot.
     """
@@ -73,7 +73,7 @@ def round_commands(
 
     * ``number``: number of the round, from 1.
     * ``ticks``: whether the round writes the period of the tick reports.
-    * ``correction``: whether the left short correction may have been overwritten.
+    * ``correction``: whether the setting LEFT_SHORT_CORRECTION may have been overwritten.
     * ``date``: whether the round requests a date.
     """
     rest = list(_writes(settings, ticks=ticks, correction=correction))
@@ -103,7 +103,7 @@ def _writes(settings: LoisEcuSettings, *, ticks: bool, correction: bool) -> Iter
 def _repeating(commands: Iterable[Command], settings: LoisEcuSettings) -> Iterator[Command]:
     """Yield ``commands``. A command for a long period of the tick reports is yielded twice.
 
-    Few rounds of settings write a long period, and the board may lose a single line.
+    The board may lose a line, and a long period is written in fewer rounds than other settings.
     """
     for command in commands:
         yield command

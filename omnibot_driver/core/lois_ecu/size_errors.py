@@ -42,7 +42,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Extend the path, and all its variants, by the distances that the wheels have rolled.
+        """Extend the path, and its variants with errors, by the distances that the wheels rolled.
 
         ``track_m``: track width; negative if the wheels are swapped.
         """

@@ -48,8 +48,8 @@ class SpeedErrors:
     def restored(self) -> None:
         """Record that the filter has gone back to an earlier state.
 
-        After a duty command, the restored biases may be those of RPM set-points. In this case, the
-        next call of ``follow`` resets the errors of both wheels.
+        If a wheel follows a duty command, the earlier state may contain the speed errors of RPM
+        set-points. So the next call of ``follow`` resets the speed errors of both wheels.
         """
         if self._kinds and "duty" in self._kinds:
             self._kinds = None
@@ -57,9 +57,9 @@ class SpeedErrors:
     def follow(self) -> None:
         """Reset the bias of each wheel whose kind of command has changed.
 
-        If the kind of at least one wheel has changed, also reset the excess of both wheels. A Stop
-        after a duty command does not change the kind, because such a Stop does not change the error
-        of the speed.
+        If at least one kind has changed, also reset the excess (relative error of a backward speed)
+        of both wheels. A Stop after a duty command does not change the kind, because such a Stop
+        does not change the error of the speed.
         """
         before = self._kinds or ("", "")
         left, right = [

@@ -31,8 +31,8 @@ TOO_FAST_RPM: Final = 3
 times the set-point, and more than ``TOO_FAST_RPM`` RPM above it."""
 UNLIKE: Final = 1.15
 """Largest usual ratio between the *relative speeds* of two wheels that roll backward. The relative
-speed of a wheel is its speed divided by its set-point. Up to ``UNLIKE`` times the relative speed of
-the other wheel, the reported speed of a wheel is not regarded as too high."""
+speed of a wheel is its speed divided by its set-point. A wheel's speed is regarded as too high only
+if its relative speed is more than ``UNLIKE`` times that of the other wheel."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8

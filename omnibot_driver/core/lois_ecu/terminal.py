@@ -23,8 +23,8 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    The driver stops the robot before the board enters a sensor's mode, and before each change of a
-    parameter that the caller announces by ``stop_first``. ``want`` requests a mode. ``want`` and
+    ``want`` requests a mode; ``stop_first`` announces the change of a parameter. The driver stops
+    the robot before such a change, and before the board enters a sensor's mode. ``want`` and
     ``stop_first`` may be called at any time.
     """
 

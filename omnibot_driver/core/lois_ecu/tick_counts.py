@@ -32,17 +32,17 @@ The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, pl
 SILENT_S: Final = 1.0
 """Limit in s for a time without tick reports.
 
-After a longer time, counts near zero and an irregular clock prove a restart of the board. After a
-shorter time, wheels that have rolled back may explain such counts, so the expected motion must
-contradict the counts too.
+After a longer time, counts near zero prove a restart of the board if the board's clock deviates
+from the fitted clock. After a shorter time, the wheels may have rolled back to such counts. A
+restart is then proved only if the expected motion also excludes the counts.
 """
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
 """Longest time in s in which wheels are assumed to roll back between two tick reports.
 
-The limit applies if the second report makes the unit of the board's clock unknown. Otherwise, the
-driver assumes that the wheels may roll back in the whole time between the reports.
+The limit applies only if the unit of the board's clock was known before the second report, and is
+unknown after it. Otherwise, the wheels may roll back in the whole time between the reports.
 """
 IN_FLIGHT_S: Final = 0.5
 """Time in s for which received counts may still be from before a reset.
@@ -163,8 +163,8 @@ class TickCounts:
 
         * A new count is larger than the number of ticks that a wheel can roll in ``duration_s``.
         * The expected motion explains the new counts, and a wheel can roll back by ``fallen`` ticks
-          in ``duration_s``. This case requires that the clock counts ns, that the board counts the
-          ticks of both wheels, and that ``duration_s`` is at most ``SILENT_S``.
+          in ``duration_s``. The driver checks this only if the board's clock counts ns, the board
+          counts the ticks of both wheels, and ``duration_s`` is at most ``SILENT_S``.
         """
         turns = FASTEST_TURNS_PER_S * duration_s + TURNS_MARGIN
         most = turns * self.ticks_per_revolution + TICKS_MARGIN

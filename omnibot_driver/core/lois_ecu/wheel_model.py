@@ -41,9 +41,9 @@ class WheelModel:
 
     ``kind``, ``target_mps``: the command that the motor follows now.
 
-    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. The firmware counts ticks only
-    while this target is positive. The firmware keeps the target when a duty is commanded. While the
-    duty is negative, each tick lowers the target.
+    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. A duty command does not change
+    this target, but while the duty is negative, each tick lowers the target. The firmware counts
+    ticks only while the target is positive.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:

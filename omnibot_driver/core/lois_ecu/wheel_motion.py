@@ -46,12 +46,11 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Factors in s for an error of a wheel's distance, with the board's own gains and with the user's.
+"""Factors in s for the distance error of a wheel that halts soon after a new set-point.
 
-A wheel that halts soon after a new set-point has not yet reached the assumed speed, so it has
-rolled less far than assumed. The standard deviation of this error in m is the factor times
-``unsettled_mps``: the difference between target and speed when the set-point took effect, which
-decays with time.
+Such a wheel has not yet reached the assumed speed, so it has rolled less far than assumed. The
+standard deviation of this error in m is the factor times ``unsettled_mps``. The first factor is for
+the board's own gains, the second for the user's gains.
 """
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
@@ -97,8 +96,7 @@ class Wheel:
 
         The motion is certain when the board measures a new speed, when the board restarts, when the
         speed controller is reset, and when the wheel starts. If the driver notices later that the
-        wheel has been at rest since then, the driver subtracts the distance that it has added since
-        then.
+        wheel has not moved since that moment, it subtracts the distance added after that moment.
         """
         self.begin_again()
 
@@ -163,12 +161,12 @@ class Wheel:
     def counts(self, speed_mps: float, *, signed: bool) -> float:
         """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
-        * 1: the count increases when the wheel rolls forward. If ``signed``, the count decreases
-          when the wheel rolls backward, and the factor is always 1.
+        ``signed``: whether the count decreases when the wheel rolls backward. The factor is then
+        always 1. Otherwise:
+
+        * 1: the count increases when the wheel rolls forward.
         * -1: the wheel rolls backward, but the count increases.
         * 0: the board does not count.
-
-        ``signed``: whether the count decreases when the wheel turns backward.
         """
         if signed:
             return 1.0

@@ -86,7 +86,7 @@ class Adjusting(Moves):
         """Set the ratio of wheel speeds (left / right) from which the robot's turn is computed.
 
         * Turn on the spot, and backward drive (B) without reported headings: the expected ratio.
-        * All other motions: None.
+        * All other motions: None; the turn is computed from the reported headings.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:

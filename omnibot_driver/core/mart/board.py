@@ -236,9 +236,9 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server's heading is exactly zero, as before its first RM (forward drive).
+        """Whether the server has made no forward drive (RM) yet: its heading is exactly zero.
 
-        If not, the driver must not set back the server's clock: RM integrates the turn rate over
+        Otherwise, the driver must not set back the server's clock: RM integrates the turn rate over
         the time since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero

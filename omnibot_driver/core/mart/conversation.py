@@ -157,8 +157,8 @@ class Conversation(LateReplies):
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply is recorded as missing, because it may come late. The reply to a controlled move
-        is not recorded: the driver still waits for it while it stops the move.
+        The reply is then expected as a late reply. Exception: the code that stops a controlled move
+        waits for the move's reply itself.
         """
         if self.pending is None:
             return None

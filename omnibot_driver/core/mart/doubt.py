@@ -85,7 +85,7 @@ class Doubt:
         bend: float,
         aside_m: float,
     ) -> None:
-        """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
+        """Extend the covariance by a displacement of ``way_m`` and ``turn_rad`` within ``seconds``.
 
         ``heading_rad``: heading before the displacement, in the odometry frame.
 
@@ -138,7 +138,7 @@ class Doubt:
         self._levers[2] = x_m, y_m, self._bend_before_rad
 
     def add(self, m2: float, rad2: float) -> None:
-        """Add independent errors of x, y and heading.
+        """Add independent errors of x, y and heading to the covariance.
 
         ``m2``: variance of x and of y, in m².
 
@@ -201,7 +201,7 @@ def _by_gyro(told_rad: float) -> float:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return the variances and directions of independent errors of x, y and heading.
+    """Return independent errors of x, y and heading, each with its variance and direction.
 
     ``way_m``, ``turn_rad``: standard deviations of x and of y (m), and of the heading (rad).
     """

@@ -44,8 +44,8 @@ class DrivenWheel:
     def error(self, less: int, seconds: float, per_unit_mps: float) -> float:
         """Return the measured speed minus the expected one, in nominal units.
 
-        ``less``: units to subtract from the assumed units in the averaging window, because changes
-        of the units were lost. ``seconds``: duration of the averaging window.
+        ``less``: assumed minus real units of the motor, which differ after a lost command.
+        ``seconds``: duration of the averaging window.
 
         ``per_unit_mps``: speed in m/s that an ideal motor has with one unit.
         """

@@ -83,8 +83,8 @@ class FailedStarts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        The result is False for an obstacle that the front sonar detects too, or that RM reports
-        again.
+        The result is False for an obstacle that the front sonar detects too, or that RM has
+        reported twice in a row.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -79,8 +79,8 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""Time without a reply, in s, after which the server may have been restarted. This limit applies to
-a server whose stop port hangs."""
+"""Time without a reply, in s, after which the server may have been restarted, so that its stop port
+no longer hangs."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
@@ -231,8 +231,8 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply. Decide whether the server may have been restarted.
 
-        A restart is possible after a long silence. It is also possible if the last answer to HELLO
-        came from a server that is not a motion controller.
+        A restart is possible after a long silence. The server may also have been started just now,
+        if a server of another kind gave the last answer to HELLO.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:

@@ -71,7 +71,7 @@ class Health:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: forget all measurements, but keep ``outlived``."""
+        """Begin a new connection. Forget all measurements, but not that the stop port may hang."""
         self.heading_told: set[Motion] = set()
         self.heading_changes = 0
         self._defective = False

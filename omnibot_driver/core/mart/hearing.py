@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the pilot does when a reply comes, and when a reply does not come in time.
+"""What the driver does when a reply comes, and when a reply does not come in time.
 
-This module knows the pilot's states and the replies; it does not know the next request.
+This module knows the driver's states and the replies; it does not know the next request.
 """
 
 import math
@@ -19,16 +19,15 @@ from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units that may stay without a reply. If the reply to a
-larger change is missing, the driver stops the robot.
+"""Limit for a command that changes the motors' units, as a relative change.
 
-The limit applies to a backward drive (B) in which the server reports no headings. In such a drive,
-the robot's turn is computed from the units.
+In a backward drive (B) without reported headings, the driver computes the robot's turn from the
+units. If the reply to a larger change is missing in such a drive, the driver stops the robot.
 """
 
 
 class Hearing(Measuring):
-    """The part of the pilot that evaluates the server's replies."""
+    """The part of ``Pilot`` that evaluates the server's replies."""
 
     def hear(self, data: bytes, now: float) -> None:
         """Evaluate a datagram from the command port."""

@@ -26,8 +26,7 @@ PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check of the IMU, in s.
 
 If a check takes longer, the driver assumes that the network has delayed the request and the reply
-equally. So when the reply arrives, the age of the result is half of the time by which the check
-took longer than usual.
+equally. The age of the result is then the delay of the reply.
 """
 EARLY: Final = 4
 """Number of failed checks of the IMU in a row after which the driver tells the user that the server

@@ -77,8 +77,8 @@ COMPARED: Final = frozenset({Job.LAST_MOVE, Job.LAST_TURN})
 The job succeeds only if both downloads are equal.
 """
 FILES_BEGIN: Final = {
-    Job.LAST_MOVE: "the file begins with a move: drive forward or backward, then call again",
-    Job.LAST_TURN: "the file begins with a turn: turn the robot on the spot, then call again",
+    Job.LAST_MOVE: "the file exists only after a move: drive forward or backward, then call again",
+    Job.LAST_TURN: "the file exists only after a turn: turn the robot on the spot, then call again",
 }
 """What the user must do to get a file of the last move or turn, if the controller has none."""
 UNPROVED: Final = (

@@ -29,7 +29,10 @@ class LateReplies:
         self._answers: dict[Word, tuple[Ok | Fail, float]] = {}
 
     def heard(self, form: Form, now: float) -> None:
-        """Record that a reply with this form came. Its duplicate may come within ``delay_s``."""
+        """Record that a reply came. Its duplicate may come within ``delay_s``.
+
+        ``form``: the kind of text after ``ok`` in the reply.
+        """
         self._copies_until_s[form] = now + self.delay_s
 
     def answered(self, word: Word, reply: Ok, now: float) -> None:

@@ -75,9 +75,9 @@ class MotorLine:
         self._set(slope, offset)
 
     def stood(self, units: float) -> None:
-        """Lower the offset until the speed at ``units`` is zero, because the motor has not turned.
+        """Lower ``offset`` until the speed at ``units`` is zero, because the motor has not turned.
 
-        An obstacle may be the cause, so the offset becomes as uncertain as at the beginning.
+        An obstacle may be the cause, so ``offset`` becomes as uncertain as at the beginning.
         """
         self._set(self.slope, min(self.offset, -self.slope * units))
         self._so, self._oo = 0.0, OFFSET_SD**2

@@ -247,7 +247,7 @@ class Moves(Asking):
         return done.stopped_again and not (done.completed and no_time)
 
     def _stop_contradicted(self, done: Done) -> None:
-        """Discard the goal, because wheel and server have measured different angles of a turn."""
+        """Discard the goal, because encoder and server have measured different angles of a turn."""
         self.odometry.doubt_turn(done.asked - abs(done.turned_rad))
         if self._move is not None:
             self._move.fail()

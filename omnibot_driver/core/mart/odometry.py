@@ -21,7 +21,8 @@ SLOWING_S: Final = 0.12
 ACCELERATION_MPS2: Final = 1.0
 """Standard deviation of the acceleration since the last count, in m/s²."""
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
-"""Standard deviations by which the robot may be faster than measured, in m/s and rad/s."""
+"""Amounts in m/s and rad/s by which the robot may be faster than measured. They increase the
+uncertainty of the predicted pose."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
 """Standard deviations of speed and turn rate after the start of a motion, in m/s and rad/s.
 They apply until speed and turn rate are measured."""

@@ -42,11 +42,10 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 VOLTS crashes a server that is starting up, but must precede the first motion.
 """
 VOLTS_S: Final = 10.0
-"""Limit of the delay of the voltage query (VOLTS), in s after the last VOLTS.
+"""Longest delay of the voltage query (VOLTS) by unanswered requests, in s after the last VOLTS.
 
-Unanswered requests delay VOLTS, but not beyond this limit. In the first STARTS_UP_S (s) after a
-motion, the delay may be longer: the motion may have been a long turn on the spot, in which the
-driver sends no VOLTS (see ``_may_ask_volts``).
+In the first STARTS_UP_S (s) after a motion, unanswered requests can always delay VOLTS, because the
+driver sends no VOLTS during a turn on the spot.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -105,9 +104,8 @@ class Pilot(Hearing):
     def busy(self, now: float) -> bool:
         """Return whether the driver expects the server to be silent, because the server is busy.
 
-        The result is False if the server may be lost, because the server had been silent for too
-        long (``_absent_s``) when the driver began to stop a motion. A controlled move is an
-        exception, because every server is silent during such a move.
+        The result is False if the server may be lost: before the driver began to stop a motion, the
+        server was silent for too long (``_absent_s``). Silence in a controlled move is normal.
         """
         if (stopping := self._stopping) is not None:
             silent = stopping.move is None and stopping.began_s - self.heard_s > self._absent_s
@@ -231,9 +229,9 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        The server is silent during a move. So either of two replies excludes a duplicate: an
-        encoder count that the server measured after the end of the move, or the answer to a HELLO
-        that the driver sent after the start of the move.
+        The server executes a duplicate before it answers a later query. So a duplicate is excluded
+        by an encoder count that the server measured after the end of the move, or by the answer to
+        a HELLO that the driver sent after the start of the move.
         """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free

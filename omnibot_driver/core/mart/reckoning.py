@@ -140,8 +140,8 @@ class Reckoning(CorrectedPose):
     def rest(self, longest: float = math.inf) -> float:
         """End the motion. Call this after its last encoder count, which includes the coasting.
 
-        If the server has reported an implausible angle of a turn, return the wheel's angle minus
-        the server's angle, in rad. Otherwise, return 0.
+        If the server has reported an implausible angle of a turn, return the angle by the encoder
+        minus the angle by the server, in rad. Otherwise, return 0.
 
         ``longest``: longest possible distance of a straight move in m, or largest turn in rad.
         """
@@ -245,10 +245,9 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Motion that the pose may lack: distance of the right wheel in m, and turn in rad.
 
-        Both values are zero, except while the network may have lost the start command. While the
-        command may be lost, the pose does not include the last encoder count, because this count
-        may be from before the motion. If the server has received the command, it counts from zero,
-        and the pose lacks the motion that the count shows.
+        Both values are zero, except while the network may have lost the start command. In this
+        time, the last encoder count may be older than the motion, so the pose does not include the
+        count. The result is the motion that the count shows if the count is not older.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)

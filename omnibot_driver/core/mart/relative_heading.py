@@ -43,8 +43,8 @@ class RelativeHeading:
     """The relative heading within a motion.
 
     * ``told_s``: time of the last accepted heading.
-    * ``from_s``: earliest possible time at which the server measured the last certain heading. A
-      heading is uncertain if it has changed and its reply may answer an earlier query (RMRA).
+    * ``from_s``: earliest time at which the server can have measured the last certain heading. A
+      changed heading is uncertain if its reply may answer an earlier query (RMRA).
     * ``changed_s``: time of the last change of heading.
     * ``same``: number of equal headings since the last change.
     """

@@ -18,10 +18,10 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Limit for the start of a turn on the spot, as a fraction of the final yaw rate. The turn does not
-begin while a ramp keeps the commanded yaw rate farther than this from its final value.
+"""Largest difference between commanded and final yaw rate with which a turn on the spot begins.
 
-The server cannot change the rate of a turn.
+The value is a fraction of the final yaw rate. The server cannot change the rate of a turn, so the
+driver waits until a ramp has brought the commanded yaw rate this near to the final one.
 """
 
 

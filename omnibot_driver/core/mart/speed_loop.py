@@ -36,9 +36,9 @@ SETTLE_S, LEARN_S = 0.45, 0.35
 """
 LARGE_UNITS: Final = 3
 MOST_MISSED: Final = 4
-"""Largest number of unanswered changes of the units that the driver examines together.
+"""The driver remembers at most this number of unanswered changes of the motors' units.
 
-The measured speeds show which of these changes have arrived at the server.
+From the measured speeds, the driver finds out which of these changes have arrived at the server.
 """
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """How the driver learns about the motors if exchanges with the server are slow. An exchange takes
@@ -131,9 +131,9 @@ class SpeedLoop(Motors):
         commanded.
 
         If a motor has MOST_DEAD units or more, something blocks the motor, and the driver learns
-        nothing from it. If ``units`` is None and a motor should certainly turn
-        (``MotorLine.turns``), the MotorLine of this motor stays unchanged, and only the next start
-        gets more units.
+        nothing from it. Otherwise, the driver corrects the motor's MotorLine, and raises the units
+        of the next start. If ``units`` is None, a MotorLine by which the motor certainly turns
+        (``MotorLine.turns``) stays unchanged.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -271,7 +271,10 @@ class SpeedLoop(Motors):
         return (right, left) if right or left else None
 
     def changed(self, right: int, left: int, now: float) -> None:
-        """Record that a change of the motors' units was sent. The motors are assumed to obey it."""
+        """Record a command that changes the units of the motors by ``right`` and ``left``.
+
+        The driver assumes that the motors obey the command.
+        """
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
         self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
         self._change = self._right.change(right), self._left.change(left)

@@ -27,13 +27,13 @@ OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 ``OFF_AGAIN``: at all other times. It is larger, because a new start disturbs the motion.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Limits of the rates that the driver learns from turns, as fractions of the commanded rate.
+"""Limits for learning from slow turns, as fractions of the commanded rate.
 
-``HELD``: after the first learned turn, the driver learns nothing from a turn with a lower measured
-rate, because something holds the robot.
+``LEAST_LESSON``: lowest rate that the driver learns. If the measured rate of the first turn is
+lower, the driver learns this limit instead.
 
-``LEAST_LESSON``: if the driver learns from a turn with a lower measured rate, it learns this limit
-instead of the measured rate.
+``HELD``: lowest measured rate of a later turn from which the driver learns. In a slower turn,
+something holds the robot.
 """
 EVEN: Final = 0.15
 """Relative change of the rate during a turn, below which the driver learns from the turn."""
@@ -56,7 +56,8 @@ STEADY: Final = 0.03
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-* ``SPINS_UP_S``: least duration of the turn in s; the averaging time of the rate is added.
+* ``SPINS_UP_S``: least time in s from the start of the turn to the window in which the rate is
+  averaged.
 * ``SEEN_RAD``: least angle of the turn, in rad.
 * ``TOLD_RAD``: angle in rad above which the server's angle is used instead of the wheel's.
 """
@@ -262,7 +263,10 @@ class SpotTurns:
         self._has_learned = True
 
     def keep_lessons(self) -> None:
-        """Keep what the driver has learned until now, so that no later turn can undo it."""
+        """Keep what the driver has learned, even if the next turn is fast.
+
+        Otherwise, a fast turn undoes what the driver has learned from the slow turn before it.
+        """
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:

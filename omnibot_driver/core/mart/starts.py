@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The start of motions, and of jobs.
+"""The start of motions, and of jobs such as a download.
 
 This module knows the wanted motion and the start commands; it does not know when a motion must end.
 The caller passes the time.
@@ -32,12 +32,11 @@ from omnibot_driver.core.mart.words import Form, Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 NAME_WAIT_S: Final = 2.0
-"""Longest time in s for which the driver delays a controlled move, because a HELLO that was sent
-before the move may arrive at the server after the move.
+"""Longest time in s for which a controlled move waits until all earlier HELLOs have arrived.
 
-After a move, an answer to HELLO usually proves that no duplicate of the move is running. The answer
-to a HELLO from before the move would prove nothing. If the delay reaches this time, the driver
-sends the move nevertheless, and does not use answers to HELLO as this proof.
+After a move, an answer to HELLO proves that no duplicate of the move is running, but not if the
+HELLO was sent before the move. If the wait reaches the limit, the driver sends the move
+nevertheless, and does not use answers to HELLO as a proof.
 """
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""
@@ -134,10 +133,10 @@ class Starts(ImuChecks):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether the command ``start`` must wait, because a HELLO may still be on its way.
 
-        Only a controlled move waits. After a move, the server's answer to HELLO shows the driver
-        that no duplicate of the move is running. If a HELLO from before the move arrived after the
-        move, its answer could show this falsely. The wait ends after ``NAME_WAIT_S``. After a fresh
-        check of the IMU, there is no wait, because the driver has already waited before the check.
+        Only a controlled move waits, for at most ``NAME_WAIT_S``. After the move, the driver takes
+        an answer to HELLO as proof that no duplicate of the move is running. The answer to a HELLO
+        from before the move would be a false proof. After a fresh check of the IMU, the move does
+        not wait, because the driver has already waited before the check.
         """
         if start.word.kind is not Kind.MOVE or self.imu.fresh(now):
             return False
