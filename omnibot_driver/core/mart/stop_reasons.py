@@ -49,11 +49,11 @@ BLOCKED_S: Final = 0.6
 STUCK_S, COASTS_S = 0.5, 0.2
 """Times in s for which the left wheel, which has no encoder, may turn unseen.
 
-``STUCK_S``: used when the robot does not seem to move. If only the right wheel is stuck, the left
-wheel may turn for this time before the driver stops the robot.
+``STUCK_S``: for a robot that is stopped because it does not seem to move. If only the right wheel
+is stuck, the left wheel may have turned for this time.
 
-``COASTS_S``: used when the driver stops the robot because a wheel is blocked. The last encoder
-count shows that the right wheel is at rest, but the left wheel may still coast for this time.
+``COASTS_S``: for a robot that is stopped because a wheel is blocked. The encoder shows that the
+right wheel is at rest, but the left wheel may still coast for this time.
 """
 
 

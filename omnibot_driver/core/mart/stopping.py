@@ -88,9 +88,8 @@ class Stopping:
 
     ``rounds``: number of times that the driver has sent the stop to the command port.
 
-    ``strange``: text of the last failure that the driver does not expect as a reply to a stop. If
-    there is none, the text of the first reply that no motion is in progress. Empty if there is no
-    such reply either.
+    ``strange``: a text for the user: the last failure that is unusual as a reply to a stop, or else
+    the first reply that no motion is in progress. Empty if there is neither.
     """
 
     def __init__(
@@ -201,11 +200,10 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop command, or None.
 
-        A doubtful reply may also be late, or a copy. ``owed`` earlier requests are unanswered. If
-        there are at most ``owed`` doubtful replies, all of them may be late replies to these
-        requests, and the value is None. If there are more, the value is the last doubtful reply
-        whose number is plausible for a reply to the stop command. If no reply has a plausible
-        number, the value is the last doubtful reply.
+        Each of the ``owed`` unanswered earlier requests may have caused one doubtful reply. If
+        there are no further doubtful replies, the value is None. Otherwise, the value is the last
+        doubtful reply whose number is plausible for a reply to the stop command. If no number is
+        plausible, the value is the last doubtful reply.
         """
         if len(self._doubtful) <= self._owed:
             return None

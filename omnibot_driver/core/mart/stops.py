@@ -46,8 +46,8 @@ class Stops(StopReasons, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
-        the user's command, except if the driver already refuses further motions of this kind until
-        the command ends.
+        the user's command, except if this kind of motion is blocked: the driver refuses a blocked
+        motion until the command ends.
 
         ``arrived``: whether it is certain that the server received the start of the motion.
         """
@@ -190,13 +190,13 @@ class Stops(StopReasons, ABC):
     def _outlives(self, reply: Reply, now: float) -> None:
         """Detect whether the server's stop port still waits for the end of an old motion.
 
-        If the driver has used the stop port, and the server then answers ``ok`` to a stop, the stop
-        port still waits. The port could mistake the start of the next forward drive (RM) for the
-        end of the old motion. Nothing would then stop this drive; see
-        docs/internals/mart_protocol.md.
+        The driver uses the stop port as the last resort, when the server does not answer stops. If
+        the server later answers ``ok`` to a stop, it was not restarted, so its stop port still
+        waits. The port could mistake the start of the next forward drive (RM) for the end of the
+        old motion. Nothing would then stop this drive; see docs/internals/mart_protocol.md.
 
         A reply with a number is ignored. It answers an earlier query, or the stop command of a turn
-        on the spot. A stop command of a turn leaves the stop port free.
+        on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return
@@ -254,7 +254,7 @@ class Stops(StopReasons, ABC):
             self._notice(self._obstacle(reply, motion), halt=True)
 
     def _block(self, motion: Motion, why: str) -> None:
-        """Refuse the direction of ``motion`` until the user's command ends or is zero."""
+        """Refuse the direction of ``motion`` until the user ends the command, or commands zero."""
         if self._blocked is not motion:
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"

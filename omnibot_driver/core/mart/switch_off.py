@@ -70,8 +70,8 @@ class SwitchOff:
     def begins(self, *, straight: bool) -> None:
         """Record that a motion begins.
 
-        The motion sets the speeds of both motors. So MCS (switch off the motors) is no longer
-        needed for a motor that was on before.
+        The motion sets the speeds of both motors. So a motor that the server had left on needs no
+        MCS (the command that switches off the motors) any more.
 
         ``straight``: whether it is a straight controlled move, after which a motor may stay on.
         """
@@ -109,9 +109,9 @@ class SwitchOff:
         """Record that MCS or MSM was not answered; return whether the driver gives up MCS now.
 
         After MOST_MISSES unanswered requests in a row (MOST_MISSES_DISTURBED in a ``disturbed``
-        network), the driver does not repeat the last request, and allows motions again. If the last
-        request was MCS, the driver also gives up MCS until the next connection or a call of
-        ``doubt``. The result is True for the call that gives up MCS, and False for all other calls.
+        network), the driver stops repeating the request, and allows motions again. If the request
+        was MCS, the driver gives up MCS until the next connection or a call of ``doubt``. The
+        result is then True, but not again before MCS is answered or a new connection begins.
 
         The server may execute an unanswered MCS later. The server then refuses the next motion, and
         the driver sends MSM, which ends the direct control by MCS.

@@ -71,8 +71,8 @@ class TurnRecords:
     def asked(self) -> None:
         """Record that the driver begins to download a record.
 
-        At first, the download is counted as a failure. ``used`` clears the count of failures when
-        the odometry has used the record.
+        At first, the download is counted as a failure. When the odometry has used the record, the
+        method ``used`` sets the count of failures to zero.
         """
         self._downloads += 1
         self._failures += 1

@@ -14,10 +14,11 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Terms of the largest accepted error of a count whose reply may belong to another query.
+"""Tolerance for an encoder count that may be the reply to another query.
 
-This error is DOUBT_M + DOUBT_MPS * (a + b), in m. Here ``a`` is the driving time in s since the
-last count, and ``b`` is the uncertainty in s of the time of the reply.
+The distance since the last count may differ from the expected distance by at most
+DOUBT_M + DOUBT_MPS * (a + b), in m. Here ``a`` is the driving time in s since the last count, and
+``b`` is the uncertainty in s of the time of the reply. Otherwise, the count is rejected.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time between them.
@@ -54,9 +55,9 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last reported count, while this count may be from before the start command; else
-    0. The count may be from before the command if it differs by at most 1 from the last count
-    before the command: if the network lost the command, the server did not reset the count.
+    ``maybe``: the last reported count, if the network may have lost the last start command, so that
+    the server has not reset the count; else 0. The driver suspects such a loss if the count differs
+    by at most 1 from the last count before the command.
     """
 
     def __init__(self) -> None:
@@ -93,8 +94,7 @@ class WheelCount:
           so the server was restarted, and the result is True. The pose already includes the counts
           of the motion.
         * The server has sent no acknowledgement and no count of the motion: the motion did not
-          begin, and the result is False. The count continues from its value before the start
-          command.
+          begin, and the result is False. The last count before the start command is valid again.
         """
         if self._confirmed:
             return False
