@@ -94,8 +94,8 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Cost of an IMU frame whose acceleration is below 0.5 g and contains the bytes of an IMU header.
 
-The decoder has probably misread such a frame. The bytes in the acceleration are the true header,
-and the bytes that were taken for the header are a gyro value of -6 of the frame before.
+Such a frame is probably misread. A gyro value of -6 has the same two bytes as the IMU header, so
+the frame seems to begin at this value. The true header is in the supposed acceleration.
 """
 JUMP: Final = 2.5
 """Cost of a frame whose counter did not advance by one. The decoder then assumes that a frame was
@@ -132,10 +132,10 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which the decoder no longer expects a delta.
+"""Number of missing deltas after which the decoder no longer expects a first delta.
 
-This limit applies only while no delta is known: at the beginning of a stream, and after damage,
-until a delta arrives. The missing deltas are counted by the IMU frames that have arrived.
+The decoder waits for a first delta at the beginning of a stream, and after damage. The number of
+IMU frames since then shows how many deltas are missing.
 """
 
 
@@ -156,9 +156,9 @@ class Context(NamedTuple):
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """Return the context after an unknown number of frames were lost.
+        """Return what is still known of earlier frames after an unknown number of frames was lost.
 
-        The sequence number, the pose and the sum of the deltas' turns are then unknown.
+        The sequence number, the pose and the sum of the deltas' turns are unknown then.
         """
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 

@@ -241,10 +241,10 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept the frames of ``walk`` except the last two; always return False.
+        """Accept a run of frames (``walk``) except the last two frames; always return False.
 
-        The bytes after the last frame are unusual, so the last two frames are uncertain. The caller
-        ``_walk`` returns False if a frame is uncertain.
+        The bytes after the run are unusual, so its last two frames are uncertain. The caller
+        ``_walk`` returns this result, because False means that a frame is uncertain.
         """
         believed = len(walk.frames) - 2
         if believed > 0:

@@ -55,9 +55,9 @@ class InterFrameGaps:
     """The pauses within the bytes that the decoder holds, and what is known of this line's pauses.
 
     * ``byte_s``: time in s that the line takes for a byte.
-    * ``between``: whether pauses normally are between frames, so that a frame begins in the read
-      after a pause.
-    * ``sharp``: whether a frame normally begins with the first byte after a pause.
+    * ``between``: whether pauses are normally between frames, so that a frame begins somewhere in
+      the read after a pause.
+    * ``sharp``: whether this frame normally begins with the first byte of the read.
     * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. After that,
       further confirmations are not counted.
     * ``at_pace``: whether the line was busy for the whole time between the last two reads.
@@ -72,7 +72,10 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """Stop trusting pauses, because something other than an idle line may have caused them."""
+        """Stop assuming that pauses are between frames.
+
+        Something other than an idle line may have caused the pauses.
+        """
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
@@ -120,8 +123,8 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Learn from accepted frames whether this line's pauses are between frames.
 
-        For each pause, compare the pause's position with the frames, and update ``between`` and
-        ``sharp``.
+        For each pause, check whether a frame begins in the read after the pause (``between``), and
+        whether the frame begins with the first byte of this read (``sharp``).
 
         ``ends``: for each accepted frame, the position of its end in the bytes that the decoder
         holds.

@@ -2,9 +2,9 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-* The line was idle. A pause within a supposed frame then means that bytes were lost: the beginning
-  and the end of the supposed frame come from different ticks. All later frames seem late by
-  whole ticks.
+* The line was idle. If bytes that look like a frame contain the pause, other bytes were lost: the
+  beginning and the end of the supposed frame come from different ticks. All later frames seem late
+  by whole ticks.
 * Only the reader was late. The frames after the pause are on time again.
 
 Input: lengths of frames, and positions and times of reads; this module does not know what a frame
@@ -49,9 +49,10 @@ PACE_S: Final = 2e-4
 Within this tolerance, the bytes did not wait for the reader.
 """
 FEW_BYTES: Final = 2
-"""Largest number of bytes that is too small to measure how fast the bytes arrive.
+"""Largest number of bytes that is too small to measure how fast bytes arrive.
 
-The bytes belong to a frame with a pause, and arrive after the read that ended the pause.
+The measurement uses the end of a frame with a pause: the bytes after the first read that follows
+the pause.
 """
 TICKS_TO_PROVE: Final = 2
 """Number of further late ticks, after a first late tick, that prove that bytes were lost.
@@ -61,7 +62,7 @@ the first late tick, and must be in a separate read. After a pause of ``IDLE_S``
 further tick is enough.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Largest number of bytes after a frame that are searched for the cause of a pause in this frame.
+"""Largest number of bytes after a frame that are used to find the cause of a pause in this frame.
 If these bytes do not prove that the line was idle, a late reader is assumed to be the cause."""
 
 
@@ -174,8 +175,8 @@ def _by_the_next_frame(
     """Return the cause of a pause within a supposed frame, as shown by the bytes after this frame.
 
     * These bytes are not a frame: the line was idle.
-    * These bytes are a frame with a pause, and the second pause ended a whole number of ticks after
-      the first pause: the line was idle. At the end of each pause, the board began a new frame.
+    * These bytes are a frame with a pause that ended a whole number of ticks after the first pause:
+      the line was idle. Each pause ended at the beginning of a tick.
     * These bytes are a frame with a pause that ended at any other time: the reader was late.
     * These bytes are a frame without a pause: the reader was late.
 

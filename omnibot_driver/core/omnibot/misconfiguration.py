@@ -31,9 +31,10 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M`` (in m), ``TIMES``: limits for the check of the deltas' frame (earth or body).
 
-The check adds up the deltas once in each frame. The error of a sum is its distance from the board's
-pose. The pose contradicts the configured frame if the error in this frame is above ``CLEARLY_M``,
-and above ``TIMES`` times the error in the other frame.
+The check adds up the deltas twice: as if they were in the earth frame, and as if they were in the
+body frame. The error of a sum is its distance from the board's pose. The pose contradicts the
+configured frame if the error in this frame is above ``CLEARLY_M``, and above ``TIMES`` times the
+error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10

@@ -83,7 +83,7 @@ def begins_with_a_letter(word: int) -> bool:
 
 
 def _harmless_word(count: float, word: int, follows: int) -> int:
-    """Return the nearest word to ``count`` that has no letter and no header in its bytes.
+    """Return the nearest word to ``count`` whose bytes contain no letter (S, P, R) and no header.
 
     ``word``: ``count`` rounded. ``follows``: the byte that is sent after the returned word.
     """

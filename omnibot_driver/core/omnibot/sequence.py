@@ -35,9 +35,9 @@ board's pose can then prove a restart.
 EARLY_S: Final = 0.2
 """Tolerance, in s, of the check whether a counter began at zero after the last delta.
 
-If the counter began at zero, its count times the period is the counter's age in s. This age is
-normally less than the time since the last delta was read. The age is greater only if the driver
-read the last delta very late. The tolerance allows for such a late read.
+If the counter began at zero, its count times the period is at most the time since the last delta
+was read, plus this tolerance. The driver may have read the last delta very late, so the tolerance
+is needed.
 """
 LONG_GAP_S: Final = 1.0
 """Longest gap before a pose, in s, after which this pose can still show a restart of the board. The
@@ -52,9 +52,9 @@ class Step:
     * ``duration_s``: time that the delta covers; None if unknown.
     * ``restarted``: whether the counter seems to have restarted. Only the board's pose can prove
       it.
-    * ``doubtful``: True if ``restarted`` is True although a restart is improbable. After a pause of
-      the board, a restart is improbable if it would mean more lost deltas than a continued count.
-      After a silence, a restart is improbable if the new delta has the next count.
+    * ``doubtful``: whether ``restarted`` is True, but a restart is improbable: after a pause of the
+      board, because a restart would mean more lost deltas than a continued count; after a silence,
+      because the new count is the last count plus 1.
     """
 
     lost: int
@@ -96,9 +96,9 @@ class Sequence:
         self._may_be_new = False
         """Whether the board may have restarted in a gap since the last pose.
 
-        True if deltas were lost in the gap, and the counter of the delta after it is low enough for
-        a restart. A pause or a reconnection does not change this: the next pose is still the first
-        one after the gap."""
+        True if deltas were lost in the gap, and the count of the delta after the gap is low enough
+        for a restart. The value stays True until the next pose, even over a pause or a
+        reconnection."""
         self._left: tuple[int, float, int] | None = None
         """What is needed to withdraw a supposed restart: the last counter before it, the arrival
         time of this counter in s, and the first counter after the restart."""

@@ -33,7 +33,7 @@ from omnibot_driver.core.readings import (
 )
 
 DELTA_LSB: Final = 1e-4
-"""Size of one count of a delta: 0.1 mm in m, or 0.1 mrad in rad."""
+"""Size of one count of a delta, in m or rad: 0.1 mm or 0.1 mrad."""
 MOST_TEXTS_LOST: Final = 9
 """Largest number of "Paused" texts that can have been lost since the last received one.
 
@@ -45,14 +45,14 @@ FULL: Final = 4000
 """If a read has at least this number of bytes, the driver assumes that the kernel's buffer of 4 KiB
 was full.
 
-The decoder may keep some bytes of a read for later, and only the other bytes are counted. So the
-number is below 4096.
+The number is below 4096, because bytes that the decoder keeps for later, such as an incomplete
+frame, are not counted.
 """
 BEHIND_S: Final = 0.5
 """Delay of a read, in s, above which the driver checks whether the next read is late as well.
 
-The driver computes how long the board needs to send the bytes of the next read. The next read is
-late if the result is longer than twice the time since the previous read, plus ``BURST_S``.
+The next read is late if the board needs a longer time to send the bytes of this read than twice the
+time since the previous read, plus ``BURST_S``.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
