@@ -93,8 +93,8 @@ class ModeManager:
         self._wanted = self._wanted_before = Wanted.RUNNING if run else Wanted.ANY
         """``_wanted``: the mode that the board should be in.
 
-        ``_wanted_before``: this mode before the last request. If the board refuses a start,
-        ``_wanted`` becomes this mode again.
+        ``_wanted_before``: value of ``_wanted`` before the last request. If the board refuses a
+        start, ``_wanted`` is set to this value again.
         """
         self.output: Packets = NO_PACKETS
         """Packets to write before any others; see ``take_output``."""
@@ -233,7 +233,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether data from a running board change nothing here, because no change of mode is due.
+        """Whether no change of mode is due, so that data from a running board need no action.
 
         The value is True in the phase SETTLED, if no request is open and the wanted mode is not
         PAUSED.

@@ -28,12 +28,12 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 STILL: Final = 0.08
-"""Limit by which the filter recognises spikes of the IMU, as a fraction of a change.
+"""Tolerance of the check for spikes of the IMU, as a fraction of a change.
 
-* A change is a spike only if the next reading returns to the reading before the change. The two
-  readings may differ by at most this fraction of the change.
-* A change of one value is the flip of a bit only if every other value of the reading has changed by
-  at most this fraction of the one value's change.
+* A change is a spike only if the next reading returns to the reading before the change, within this
+  tolerance.
+* A change of one value is a flipped bit only if all other values of the reading stay constant,
+  within this tolerance.
 """
 MOST_HELD: Final = 10
 """Largest number of readings that the filter holds. The first of them is a displacement that
@@ -45,10 +45,10 @@ The ratio is larger, for example, if the board's message between the two displac
 the filter compared them, even a steady motion would look like a change.
 """
 BACK: Final = 0.25
-"""Limit by which the filter recognises spikes of displacements, as a fraction of a change.
+"""Tolerance of the check for spikes of displacements, as a fraction of a change.
 
-A change is a spike only if the next displacement returns to the displacement before the change. The
-two displacements may differ by at most this fraction of the change.
+A change is a spike only if the next displacement returns to the displacement before the change,
+within this tolerance.
 """
 
 

@@ -29,7 +29,8 @@ class Spikes:
 
     * ``left``: largest remaining change after a spike, as a fraction of the spike.
     * ``knocked``: number of values, from the beginning of the list, that a knock against the robot
-      can change implausibly much. Such a change may be a spike only if one flipped bit explains it.
+      can change implausibly much. A change of such a value may be a spike only if it looks like one
+      flipped bit.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:

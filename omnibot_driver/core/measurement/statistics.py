@@ -57,14 +57,14 @@ class StreamStatistics:
     _sent_imu: int | None = field(default=None, repr=False)
     """Number of IMU readings that the board had sent before the last displacement; None if unknown.
 
-    If a later pose shows that displacements were lost, this number grows by the number of IMU
-    readings that the board sends during these displacements.
+    If a later pose shows lost displacements, the IMU readings that the board sent during these
+    displacements are added to the number.
     """
     _imus_per_displacement: int = field(default=0, repr=False)
     _restarted: bool = field(default=False, repr=False)
     """Whether a displacement since the last pose has shown a restart.
 
-    If the next pose also shows a restart, it is the same one, and is not counted again.
+    If the next pose also shows a restart, it shows the same restart, which counts only once.
     """
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:

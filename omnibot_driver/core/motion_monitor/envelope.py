@@ -61,7 +61,7 @@ It is the ratio of the two noise limits, ``NOISE_MPS`` and ``NOISE_RADPS``.
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Directions in which the distance to the hull is computed.
+"""Directions in which the distance of a velocity from the hull of allowed velocities is computed.
 
 If the direction of the true distance is between two of them, the computed distance is too small: by
 up to 2 % of the distance, plus a tenth of the hull's length.

@@ -72,7 +72,7 @@ class FollowingError:
         *,
         heading_known: bool,
     ) -> None:
-        """Add one displacement to the error. A displacement inside the envelope resets the error.
+        """Add one displacement to the error, or reset the error if the set-points allow the motion.
 
         ``motion``: mean twist during ``seconds`` from the time ``begun_s`` on.
 

@@ -247,11 +247,11 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due; otherwise None.
 
-        The following error is the sum of the motion that the set-points do not allow. Stop is due
-        when the following error exceeds its limit. While the robot continues to move, for example
-        because somebody pushes it, Stop is due again at longer and longer intervals.
+        Stop is due when the robot has moved too far without a command: the following error exceeds
+        its limit. While the robot continues to move, for example because somebody pushes it, Stop
+        is due again at longer and longer intervals.
 
-        ``begins``: whether the following error exceeds its limit at this call.
+        ``begins``: whether the following error exceeds its limit now.
         """
         if not self._error.outside:
             self._stood_s += seconds

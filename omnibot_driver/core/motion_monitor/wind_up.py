@@ -17,9 +17,9 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""Largest assumed wind-up, in m.
+"""Largest assumed wind-up, as the extra distance in m that the wheel controllers drive.
 
-At this distance, the integrators of the wheel controllers reach their limits.
+With this wind-up, the integrators of the wheel controllers are at their limits.
 """
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
@@ -57,19 +57,17 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m by which a robot that seemed to be held fell behind its set-point.
+        """Distance in m to add to the wind-up if the robot is held in the next displacement too.
 
-        One long displacement does not prove that the robot was held. So this distance is added to
-        the wind-up only if the robot is held in the next displacement too. 0: the robot was held in
-        the last displacement, and its distance is already added. None: the robot was not held in
-        the last displacement.
+        The robot fell behind its set-point by this distance. But one long displacement does not
+        prove that the robot was held. 0: the robot was held in the last displacement, and no
+        distance remains to be added. None: the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract from the wind-up the distance of a motion that the set-points do not allow.
+        """Subtract from the wind-up the distance by which a motion exceeds the allowed motion.
 
-        Return whether the wind-up explains the motion. It does if the distance is smaller than the
-        wind-up was before this call.
+        Return whether the wind-up was larger than this distance, and so explains the motion.
 
         ``way_mps``, ``turn_radps``: by how much the velocities of the motion exceed the allowed
         velocities. ``seconds``: duration of the motion.

@@ -53,12 +53,11 @@ class BoardFrame:
         self.pose = self.gate.proved = None
 
     def continues(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether a pose continues the board's frame, although its pose counter began anew.
+        """Return whether a pose continues the board's frame, although the pose counter began anew.
 
-        The result is True if no displacement was lost since the last accepted pose, and the pose is
-        near the expected place. The counter of the poses begins anew if the board restarts, or
-        after a damaged pose. If the board had restarted, displacements would be lost, because a
-        restart takes longer than a period.
+        The pose counter begins anew if the board restarts, or after a damaged pose. A restart takes
+        longer than a period, so displacements are lost. The result is therefore True if no
+        displacement was lost since the last accepted pose, and the pose is near the expected place.
 
         ``gap``: covariance of the motion that was lost since the last accepted pose.
         """
@@ -71,22 +70,19 @@ class BoardFrame:
     ) -> bool:
         """Return whether a pose shows that the board uses a new frame since a suspected restart.
 
-        ``told``: the pose that the board reports.
+        The board's pose is zero at a restart. The first rule that applies gives the result:
 
-        ``before``: ``told`` minus the displacements that wait for a pose.
-
-        ``confirmed``: whether ``told`` agrees with the last unexpected pose of the board.
-
-        ``reachable``: whether the robot can have reached ``told`` without a restart.
-
-        There are two expected poses. The *new* pose assumes that the board's pose was zero at the
-        restart. The *old* pose assumes that the board did not restart. ``told`` *fits* an expected
-        pose if it is near this pose. The first rule that applies gives the result:
-
-        * ``told`` fits the new pose, and is nearer to the new pose than to the old pose: True.
-        * ``told`` fits the old pose: False, and the suspicion ends.
-        * ``told`` is confirmed and reachable: False, and the suspicion ends.
+        * The pose is near the pose expected after a restart, and farther from the pose expected
+          without a restart: True.
+        * The pose is near the pose expected without a restart: False, and the suspicion ends.
+        * The pose is confirmed and reachable: False, and the suspicion ends.
         * In all other cases: ``confirmed``.
+
+        ``told``: the pose. ``before``: the pose minus the displacements that wait for a pose.
+
+        ``confirmed``: whether the pose agrees with the last unexpected pose of the board.
+
+        ``reachable``: whether the robot can have reached the pose without a restart.
         """
         assert self.pose is not None
         assert self.since_restart is not None

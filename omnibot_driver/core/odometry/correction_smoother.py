@@ -52,10 +52,11 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target``, the best known pose, by a displacement, and ``pose`` by a part of it.
+        """Move ``target``, the best known pose, by a displacement.
 
-        ``room_m``, ``room_rad``: largest distance and angle by which ``pose``, the published pose,
-        may move. ``pose`` moves by the part of the displacement that these limits allow.
+        Move ``pose``, the published pose, by the part of the displacement that the limits allow.
+
+        ``room_m``, ``room_rad``: limits of the distance and the angle by which ``pose`` moves.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)

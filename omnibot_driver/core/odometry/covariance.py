@@ -26,9 +26,9 @@ UNKNOWN_YAW_VARIANCE: Final = math.pi**2 / 3
 ASTRAY: Final = 0.7
 """Position error that ``Astray`` adds, in m per driven metre and per rad² of heading variance."""
 ASTRAY_RAD2: Final = 0.03
-"""Variance of the heading, in rad², above which the odometry adds the errors of ``Astray``.
+"""Variance of the heading, in rad², above which the odometry adds two position errors (``Astray``).
 
-Below this limit, the slip of the wheels causes larger errors.
+Below this limit, the slip of the wheels causes larger position errors.
 """
 
 
@@ -142,11 +142,11 @@ NOTHING: Final = Covariance.diagonal(0.0, 0.0)
 class Astray:
     """Two errors of the position that grow with the variance of the heading.
 
-    Other code adds the position error that is proportional to the heading's error. This class adds
-    one error along the motion, and one across it. The standard deviation of each error is a
-    fraction of the driven distance: ``ASTRAY`` times the variance of the heading, but at most 1.
-    While this variance does not grow, all motions have the same relative error, so a way back
-    cancels the errors of the way out.
+    One error is along the motion, the other is across it. The standard deviation of each error is
+    the driven distance times ``ASTRAY`` times the variance of the heading, but at most the driven
+    distance. While this variance does not grow, a way back cancels the errors of the way out.
+
+    Other code adds the position error that is proportional to the heading's error.
 
     ``m2``: variance of x and of y, in m².
     """
@@ -163,8 +163,8 @@ class Astray:
     def move(self, dx_m: float, dy_m: float, rad2: float) -> None:
         """Add the errors of a displacement in the odometry frame.
 
-        ``rad2``: variance of the heading. If this variance has grown since the previous call, the
-        new errors depend less on the earlier errors.
+        ``rad2``: variance of the heading. The more this variance has grown since the previous call,
+        the less the new errors are correlated with the earlier errors.
         """
         kept = min(1.0, self._rad2 / rad2)
         part = min(1.0, ASTRAY * rad2)
@@ -244,13 +244,12 @@ class Uncertainty:
     def halt(self, way_m: float, turn_rad: float) -> None:
         """Add the uncertainty of a robot that came to rest unseen, because its board restarted.
 
-        ``way_m``, ``turn_rad``: mean distance and mean angle of the motion until the robot was at
-        rest. They are used as standard deviations. The variance of the angle is limited to that of
-        an unknown heading.
+        ``way_m``, ``turn_rad``: mean distance and mean angle that the robot moved until it was at
+        rest. They become the standard deviations of position and heading. The variance of the
+        heading is limited to that of an unknown heading.
 
-        If a later pose continues the board's old frame, the board has not restarted, and the pose
-        shows how the robot has moved. ``settle`` then removes this uncertainty together with the
-        uncertainty of the gaps. Only the uncertainty of the gaps increases the tolerance for poses.
+        If a later pose shows that the board has not restarted, ``settle`` removes this uncertainty.
+        The uncertainty does not increase the tolerance of the pose gate.
         """
         variance = min(turn_rad * turn_rad, UNKNOWN_YAW_VARIANCE)
         self._halt += Covariance.diagonal(way_m * way_m, variance)
@@ -260,10 +259,10 @@ class Uncertainty:
         self.gap = self._halt = NOTHING
 
     def bound(self, way_m: float, turn_rad: float) -> None:
-        """Set the uncertainty of all gaps to the error that the gaps have caused.
+        """Set the total uncertainty of all gaps to the error that the gaps have caused.
 
         ``way_m``, ``turn_rad``: this error in m and rad. A pose of the board has shown the error,
-        but the settings do not allow a correction.
+        but ``use_board_pose`` is False, so the error is not corrected.
         """
         self.gap = Covariance.diagonal(way_m * way_m, turn_rad * turn_rad)
         self._halt = NOTHING

@@ -103,7 +103,8 @@ class DeadReckoning:
 
         ``seconds``: duration of the gap, computed from the number of lost displacements.
 
-        ``stamped_s``: duration of the gap in s, computed from the stamps before and after it.
+        ``stamped_s``: duration of the gap in s, computed from the stamps. If it is the shorter one,
+        the published pose moves at most as far as the robot can in this time.
         """
         frame = self.frame
         if frame.pose is not None:

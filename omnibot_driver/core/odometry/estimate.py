@@ -18,7 +18,7 @@ class OdometrySettings:
     """The settings of the odometry.
 
     * ``use_board_pose``: whether the board's poses correct the odometry. If False, they give only
-      the heading, once at the beginning, and once after each reset that follows a gap.
+      the heading: once at the beginning, and again when the odometry is reset after a gap.
     * ``fastest_mps``, ``fastest_radps``: speeds that even a pushed robot does not exceed.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the reported ones.
     """

@@ -66,14 +66,14 @@ class Odometry:
         self._since_gap: Pose | None = None
         """The pose that the board would report now if it had begun a new coordinate frame in a gap.
 
-        The gap is the longest one since the board's last pose. None if there is no gap since this
-        pose, or if the robot was near the origin of the old frame before the gap.
+        The gap is the longest one since the board's last pose. None if there was no gap since the
+        board's last pose, or if the robot was near the origin of the old frame before the gap.
         """
         self._gap_lost = 0
         """Number of displacements lost in the gap of ``_since_gap``; 0 without such a gap."""
         self._told_lost = 0
-        """Number of lost displacements that unconfirmed poses have shown. They are still to be
-        added to ``lost`` of the next displacement or pose."""
+        """Number of lost displacements to add to ``lost`` of the next displacement or pose. Poses
+        that were not accepted have shown these losses."""
         self.reset()
         self._reset_s: float | None = None
         """Time in s of the last reset; None if a displacement has arrived since then."""
@@ -103,18 +103,18 @@ class Odometry:
     def reset(self, now: float = math.inf) -> list[OdometryEstimate]:
         """Move the origin of the odometry frame to the robot's current pose.
 
-        Return the estimates of displacements that were still waiting for a pose. Displacements that
-        waited for the board's first pose are discarded.
+        Return the estimates of displacements that were still waiting for a pose. If they waited for
+        the board's first pose, they are discarded, and the result is empty.
 
-        The reset may be in a gap, which ends with the next displacement. If most of the gap was
-        before the reset, the motion in the gap and in this displacement is discarded too. The
-        estimate of this displacement is then at the origin, with an unknown twist.
+        If a gap ends with the next displacement, and most of this gap was before the reset, the
+        motion in the gap and in this displacement is discarded too. The estimate of this
+        displacement is then at the origin, with an unknown twist.
 
         If motion was lost before the reset, the board's heading is uncertain. The odometry then
         takes the heading from the board's next poses, as it did at the beginning.
 
-        ``now``: time of the reset in s, by the clock of the stamps. With the default, infinity, the
-        whole gap was before the reset.
+        ``now``: time of the reset in s, by the clock of the stamps. If it is infinity (the
+        default), the odometry assumes that the whole gap was before the reset.
         """
         self.alignments += 1
         due = []
@@ -267,9 +267,10 @@ class Odometry:
         )
 
     def _began_in_gap(self, told: Pose, since_gap: Pose) -> bool:
-        """Return whether a pose shows that the board began a new frame in a gap before it.
+        """Return whether a pose shows that the board began a new frame in a gap before the pose.
 
-        The counters cannot show this: a loss of all displacements in the gap also explains them.
+        The counters cannot show this: they would be the same after a loss of all displacements in
+        the gap.
 
         ``told``: the pose.
 

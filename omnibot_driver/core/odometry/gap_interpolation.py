@@ -83,11 +83,11 @@ class GapInterpolation:
     def prove(self, way: Pose = NO_WAY) -> None:
         """Record that a pose was accepted.
 
-        ``way``: error of the assumed motion, as a tangent in body axes. The error is the motion
-        from the previous accepted pose to this pose, minus the motion that was assumed instead.
+        ``way``: the motion from the previous accepted pose to this pose, minus the motion that the
+        odometry had assumed; a tangent in body axes.
 
-        If all displacements since the previous accepted pose were lost, the mean motion per lost
-        displacement becomes ``last``, the motion that is assumed for the next lost displacements.
+        If all displacements between the two poses were lost, ``way`` is used to correct ``last``:
+        the motion that the odometry assumes for each further lost displacement.
         """
         if self._only_poses and self.missing and self.last is not None:
             tangent, period_s = self.last

@@ -74,9 +74,9 @@ class PendingDisplacements:
         """Return how long, in s, the board reported nothing before the first waiting displacement.
 
         If the duration of this displacement is known, the result is this duration times the number
-        of displacements that were lost before it. If its duration is unknown, the result is the
-        time from ``last_stamp_s``, the stamp of the last report, to its stamp. If ``last_stamp_s``
-        is None, the result is then 0.
+        of displacements that were lost before it. If the duration is unknown, the result is the
+        stamp of the displacement minus ``last_stamp_s``, the stamp of the last report; or 0 if
+        ``last_stamp_s`` is None.
         """
         if not self._waiting:
             return 0.0

@@ -50,8 +50,8 @@ class PoseGate:
         """Add a reported motion of the robot to ``doubted``, a pose that must still be confirmed.
 
         ``bridges``: whether to add also the displacements that were lost before this motion. Each
-        of them is assumed to be equal to this motion. If ``bridges`` is False, the caller adds the
-        lost displacements with the method ``bridged``.
+        lost displacement is assumed to equal this motion. If ``bridges`` is False, the caller adds
+        the lost displacements with the method ``bridged``.
         """
         if self.doubted is None:
             return

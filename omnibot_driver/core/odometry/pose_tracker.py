@@ -15,7 +15,7 @@ from omnibot_driver.core.odometry.correction_smoother import CorrectionSmoother
 from omnibot_driver.core.odometry.covariance import NOTHING, OdometryNoise, Uncertainty
 
 Factors = tuple[float, float, float]
-"""Factors by which x, y and yaw are multiplied."""
+"""Factors for x, y and yaw of a motion that the board reports: scales, and signs of the axes."""
 AS_TOLD: Final[tuple[float, ...]] = (1.0, 1.0, 1.0)
 
 
@@ -100,17 +100,21 @@ class PoseTracker:
         self.uncertainty.halt(way.way_m, way.yaw_rad)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the motion during a gap. A pose of the board has shown this motion.
+        """Add the motion during a gap, which a pose of the board has shown.
 
-        ``tangent``: the motion during the gap. The best pose moves at once. The published pose
-        follows the best pose, but not faster than the robot could move.
+        The best known pose moves at once. The published pose follows, but not faster than the robot
+        could move.
+
+        ``tangent``: the motion during the gap (twist x time).
         """
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
-        """Correct the pose by ``tangent``. The published pose takes up this correction gradually.
+        """Correct the pose. The published pose takes up this correction gradually.
 
         The uncertainty of all gaps until now is removed.
+
+        ``tangent``: the correction, as a motion (twist x time) from the best known pose so far.
         """
         if self.uncertainty.gap != NOTHING:  # else the tangent is only rounding
             self.rolled += _times(tangent, self._size)
@@ -118,10 +122,10 @@ class PoseTracker:
         self.uncertainty.settle()
 
     def bound(self, tangent: Pose) -> None:
-        """Set the uncertainty of all gaps until now to the error that the gaps have caused.
+        """Set the total uncertainty of all gaps until now to the error that the gaps have caused.
 
-        ``tangent``: this error. A pose of the board has shown the error, but the settings do not
-        allow a correction.
+        ``tangent``: this error (twist x time). A pose of the board has shown the error, but
+        ``use_board_pose`` is False, so the error is not corrected.
         """
         error = _times(tangent, self._size)
         self.uncertainty.bound(error.way_m, error.yaw_rad)
