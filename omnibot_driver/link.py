@@ -113,7 +113,7 @@ class Link:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Call ``action`` with the session, ``wish`` and the time, to execute a motion command.
+        """Execute a motion command: call ``action`` with the session, the motion and the time.
 
         ``SharedSession.command`` describes the arguments.
         """

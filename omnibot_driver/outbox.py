@@ -70,7 +70,7 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Let the thread in ``serve`` make the queued calls. The caller is not delayed."""
+        """Wake the thread in ``serve``, which makes the queued calls. The caller is not delayed."""
         if self._waiting:
             self._handed_over.set()
 

@@ -33,7 +33,9 @@ class Replay:
     """One session on one recording, which is played once.
 
     * ``deliver``: receives events, and the time of day in ns at the session's time 0.
+    * ``report``: receives None when the playback begins.
     * ``failed``: receives the exception that ended the playback thread, which is always a bug.
+    * ``refused``: receives the reason for each refused command.
 
     The replay calls ``deliver``, ``report`` and ``refused`` one at a time, in the order of the
     events.

@@ -60,8 +60,8 @@ class SharedSession:
         self.told = False
         """Whether the link wrote its last Stop to every line.
 
-        If the port was lost, the reader opens it again to write Stop. The value then stays False if
-        the robot was already proved to stand still (``Shutdown.owed`` is False).
+        If the port was lost, the reader opens it again and writes Stop. This Stop counts only if
+        the robot has not been proved to stand still (``Shutdown.owed`` is True).
         """
         self.stood = False
         """Whether the robot was known to stand still when the link ended. Stop was written to every
@@ -98,14 +98,14 @@ class SharedSession:
     ) -> None:
         """Call ``action`` with the session, the commanded motion ``wish``, and the time in s.
 
-        * ``sent_ns``: possible times at which the command was sent, as time of day in ns. There are
-          two if the sender's clock is uncertain, and none for a command to stop.
+        * ``sent_ns``: times of day, in ns, at which the command may have been sent: two if the
+          sender's clock is uncertain, none for a command to stop, otherwise one.
         * ``moves_base``: whether the command moves the base. If such a command is refused, the
           motion interlock records the refusal.
 
         Raises CommandRefused if ``action`` refuses the command, or if the command may have been
-        sent before or during a recent stall of this process. The constructor's argument ``refused``
-        is then called with the reason, unless the queue of events is full.
+        sent before or during a recent stall of this process. The constructor's ``refused`` then
+        receives the reason, unless the queue of events is full.
         """
         try:
             with self.lock:

@@ -19,10 +19,10 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between two late messages of one series.
+"""Longest pause, in s, between late messages. After a longer pause, a new series begins.
 
-If a series of late messages lasts ``HEALS_AFTER_S`` (s), the sender's clock may have been set back.
-The driver then estimates the offset of this clock anew.
+If a series of late messages lasts ``HEALS_AFTER_S`` (s), the sender's clock may have been set back,
+so the driver estimates the offset of this clock anew.
 """
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. It is the highest rate at which NTP
@@ -35,17 +35,16 @@ NTP can shift a clock gradually by ``LARGEST_CORRECTION_S`` (s) in addition, but
 a larger error.
 """
 CLOCK_RETREATS: Final = 10.0
-"""Factor for the misfit of a message that seems too early for its sender.
+"""Factor by which an early message fits its sender worse than a message that is equally late.
 
-If a message is too late, its misfit is the time by which it is late. If it is too early, its misfit
-is ``CLOCK_RETREATS`` times the time by which it is early.
+The misfit of a late message is the time by which it is late. The misfit of an early message is
+``CLOCK_RETREATS`` times the time by which it is early.
 """
 ALIKE_S: Final = 0.02
-"""Largest difference, in s, between the misfits of two senders that fit a message equally well.
+"""Largest difference, in s, at which the misfits of two senders are regarded as equal.
 
 A misfit (``_Sender.misfit_s``) says how badly the time of a message fits a sender. If several
-senders fit equally well, the driver chooses the sender whose last message had the highest
-``Arrival.number``.
+senders fit equally well, the driver chooses the sender whose last message had the highest number.
 """
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
@@ -80,8 +79,8 @@ class Delay:
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
     * ``sent_ns``: possible times of day at which the message was sent. The first is an estimate by
-      our clock. While the offset of the sender's clock is unknown, the estimate may be wrong, so
-      the time by the sender's clock follows.
+      our clock. While the offset of the sender's clock is unknown, the second is the time by the
+      sender's clock.
     """
 
     total_s: float
@@ -215,8 +214,8 @@ class _Offset:
     def misfit_s(self, difference_s: float, at_s: float) -> tuple[float, float]:
         """Return how badly a message fits this offset: least and largest possible misfit in s.
 
-        ``_Sender.misfit_s`` defines the misfit, and combines the results of the sender's two
-        offsets.
+        ``_Sender.misfit_s`` defines the misfit. A sender has two offsets: one for each of our
+        clocks.
         """
         excess_s, drift_s = difference_s - self._least_s, self._drift_s(at_s)
         weight = 1.0 if excess_s >= 0.0 else CLOCK_RETREATS

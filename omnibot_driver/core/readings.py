@@ -89,13 +89,13 @@ motion."""
 class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    * ``lost``: number of lost displacements whose motion this pose includes. ``lost`` of the next
-      DisplacementReading does not include them.
+    * ``lost``: number of lost displacements whose motion this pose includes. The next
+      DisplacementReading does not count these displacements in its ``lost``.
     * ``restarted``: whether this pose shows a restart of the board, or a new coordinate frame. A
       displacement before it may have shown the same restart.
     * ``ambiguous``: whether the counters have two explanations: a restart of the board in a gap
-      before this pose, or a loss of all displacements in this gap. Only the pose itself can then
-      show which explanation is true.
+      before this pose, or a loss of all displacements in this gap. Only the position and heading of
+      this pose can show which explanation is true.
     """
 
     x_m: float

@@ -31,7 +31,7 @@ SURE: Final = 3.5
 """Cost difference that makes a frame sure. Each interpretation that reads the frame's first byte in
 another way must cost at least this much more than the cheapest one.
 
-With this difference, the other interpretation is at least 30 times less likely.
+Each of these interpretations is then at least 30 times less likely.
 """
 STEP: Final = 5.5
 """First cost limit of the search, as a distance above the lower bound of the cost.

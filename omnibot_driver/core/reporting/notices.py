@@ -113,8 +113,7 @@ class Notices:
 
         ``measured``: whether displacements have arrived since Stop.
 
-        ``blind``: whether the last motion command is one after which the board does not measure
-        the wheels.
+        ``blind``: True if the board does not measure the wheels after the last motion command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)

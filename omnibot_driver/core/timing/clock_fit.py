@@ -20,19 +20,19 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-An adapter with a timer delays each read until the timer expires, so the delay changes from read to
-read. If the timer's period is wrong by 100 ppm, the delays repeat every 20 s. The blocks cover a
-longer time, so they contain the smallest delay.
+An adapter with a timer delays each read until the timer expires. If the timer's period is wrong by
+100 ppm, these delays drift, and reach their smallest value every 20 s. The blocks cover a longer
+time, so they contain the smallest delay.
 """
 LARGEST_SKEW: Final = 1.2e-4
-"""Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
-margin."""
+"""Largest assumed relative deviation of the board's crystal from the host's: 100 ppm plus a margin
+of 20 ppm."""
 SUPPORT: Final = 0.75
 """Selects the edge of a convex hull that is used as the fitted clock.
 
-Without lower bounds, the fitted clock is an edge of the lower convex hull of the latest points: the
-edge at this fraction, 0 to 1, of the hull's time span. A larger value selects a later edge: the
-clock follows recent points more closely, but jitter affects it more.
+Without lower bounds, the fitted clock is one edge of the lower convex hull of the kept upper
+bounds. The value is the position of this edge in the hull's time span, 0 to 1. With a later edge,
+the clock follows recent points more closely, but jitter affects the clock more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -42,11 +42,11 @@ LATE_PART: Final = 0.1
 ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Limit for the distance between a block's upper and lower bound, as a fraction of a tick's period.
+"""Limit for the distance between two bounds of the fitted clock, as a fraction of a tick's period.
 
-Each block of ticks gives two bounds of the fitted clock. If their distance is larger, the lower
-bound is not used. With an adapter's 16 ms timer, the distance is less than 2 ms, which is a fifth
-of a 10 ms tick.
+Each block of ticks gives an upper and a lower bound. If their distance is larger than the limit,
+the lower bound is not used. With an adapter's 16 ms timer, the distance is less than 2 ms, which is
+a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]
@@ -54,7 +54,7 @@ Point = tuple[int, float]
 
 
 class ClockFit:
-    """The fitted clock. It gives the time of each tick, from the first tick that was read.
+    """The fitted clock. It gives the time of each tick.
 
     * ``slope_s``: the fitted period of the ticks in s. ``period_s``: the nominal period.
     """
@@ -75,9 +75,10 @@ class ClockFit:
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
     def see(self, latest: Point, *, cut: bool) -> None:
-        """Add an upper bound: the number of a tick, and a time in s by which the tick had arrived.
+        """Add an upper bound of a tick's time.
 
-        The tick is the newest one that a read contains.
+        ``latest``: number of the tick, and a time in s by which the tick had arrived. The tick is
+        the newest one that a read contains.
 
         ``cut``: whether the read ended in the middle of this tick's sample.
         """
@@ -93,7 +94,10 @@ class ClockFit:
             self._best, self._not_before, self._block_from = None, [], tick
 
     def not_before(self, earliest: Point) -> None:
-        """Add a lower bound: the number of a tick, and a time in s by which it had not arrived."""
+        """Add a lower bound of a tick's time.
+
+        ``earliest``: number of the tick, and a time in s by which the tick had not arrived.
+        """
         self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:

@@ -31,8 +31,8 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads that certainly include a read with little delay.
 
-An adapter with a timer of 16 ms reads at five phases of a 10 ms tick, each with its own delay. In
-12 reads, each phase occurs twice, so the phase with the least delay occurs, too.
+An adapter with a timer of 16 ms reads at five phases of a 10 ms tick (0, 6, 2, 8 and 4 ms), each
+with its own delay. 12 reads contain each phase twice, so also the phase with the least delay.
 """
 CALM: Final = 0.45
 """Largest distance of a read's arrival from the fitted clock, in periods, for the fast path.
@@ -218,8 +218,9 @@ class DeviceClock:
         Return the correction in ticks. It is positive if the count was too low because of lost
         ticks.
 
-        ``counted``: whether this read contains a displacement. The tick number of the last
-        displacement is corrected too if ``counted`` is True, or if all recent arrivals were late.
+        ``counted``: whether this read contains a displacement. If ``counted`` is True, or if all
+        recent arrivals were late, the last displacement came after the lost ticks. The
+        displacement's tick number is then corrected too.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -287,8 +288,10 @@ class DeviceClock:
         ``latest_s``: latest allowed stamp, in s.
 
         ``room_s``: step in s with which the remaining stamps of this read fit evenly between the
-        last stamp and the read. The step to the new stamp is at least half a period or ``room_s``,
-        whichever is shorter, and at least ``SMALLEST_STEP_S``.
+        last stamp and the read.
+
+        The step is at least half a period, or ``room_s`` if that is shorter, but never less than
+        ``SMALLEST_STEP_S``.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
