@@ -86,9 +86,9 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest change of an accelerometer axis, from one reading to the next, with which the"
-        " driver always accepts the reading. It rejects a reading only if the change is larger, the"
-        " next reading jumps back, and a flipped bit can explain the change."
+        "Largest change of an accelerometer axis, from one reading to the next, that is always"
+        " accepted. The driver rejects a reading only if the change is larger, the next reading"
+        " jumps back, and a flipped bit can explain the change."
         " docs/internals/architecture.md has the exact rule (Implausible readings).",
         low=0.1,
         high=1000.0,
