@@ -23,7 +23,7 @@ class Firmware:
       curve ("mirrored"), or at most ±90° ("clamped").
     * ``tilt``: ``pose`` has a fifth number, the tilt.
     * ``start_resumes``: ``start`` resumes the last ``rc``, even one received while stopped.
-    * ``confirms``: a command after ``!`` is confirmed.
+    * ``confirms``: a command that begins with ``!`` is confirmed.
     * ``shows_source``: the drive Teensy's heartbeat shows the source of the last ``rc``. Otherwise
       it shows only 10 (motion allowed) or -1 (stopped).
     * ``single_precision``: times are float32, with steps of 0.2 ms after an hour.

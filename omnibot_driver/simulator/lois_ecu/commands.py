@@ -56,7 +56,7 @@ class Commands:
         self.boot()
 
     def boot(self) -> None:
-        """Switch the LED off, and reset the time of the last dropped ball."""
+        """Switch the LED off, and forget when the board last dispensed a ball."""
         self.led = False
         self._ball_at_s = -BALL_S
 

@@ -104,8 +104,8 @@ class Encoder:
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._level_from = self._level_to = 0.0
-        """``_level_from``, ``_level_to``: positions of the two neighbouring edges that have the
-        sensor between them, in periods of the disc."""
+        """``_level_from``, ``_level_to``: positions of the nearest edges on the two sides of the
+        sensor, in periods of the disc."""
         self._per_turn = steps / 2
         self._short = short
         # The distance between two marks has the position errors of both marks. So the error of each

@@ -42,9 +42,9 @@ class Edge:
 class Vehicle:
     """The robot.
 
-    ``corrections``: for each encoder, the board's two factors for the durations of levels. The
-    board multiplies the durations of short levels by the first factor, and those of long levels by
-    the second. The simulation chooses the lengths of the levels so that these factors are exact.
+    ``corrections``: for each encoder, the factors by which the board multiplies the durations of
+    the signal's short and long levels. The simulation chooses the lengths of the levels so that
+    these factors are exact.
     """
 
     def __init__(

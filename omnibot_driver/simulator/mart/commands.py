@@ -42,7 +42,7 @@ def execute(server: "MartServer", text: str) -> str | None:
             if is_motion and server.conflict:
                 return CONFLICT
             if server.starts_up and server.quirks.crashes_early and word in NEED_ALL:
-                server.end(f"{text} before all was ready")
+                server.end(f"{text} during start-up")
                 return None
             return handler(server, text)
     return NOT_SUPPORTED

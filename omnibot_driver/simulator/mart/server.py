@@ -169,9 +169,9 @@ class MartServer(ServerState):
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` when ``post`` reports the start or the end of a motion of ``kind``.
+        """Call ``then`` when ``post`` reports the next start or end of a motion of ``kind``.
 
-        If ``post`` has kept such a report, because no port waited, ``then`` is called at once.
+        If an earlier report was kept because no port waited for it, ``then`` is called at once.
         Otherwise, ``port`` waits for the next report.
         """
         motion = self.motions[kind]

@@ -24,7 +24,7 @@ class Quirks:
     * ``left_spin_in_reference_move``: L is accepted during RM, and hangs the command port.
     * ``moves_wait_for_imu``: F, B, TF, TB, PTF, MCF, MCB and SB wait for a working IMU.
     * ``drives_trust_imu``: without an IMU, RM, R and L start, and uncontrolled motions continue,
-      but obstacles, starts and stops are not detected.
+      but the server does not detect obstacles, or that the robot starts or stops.
     * ``reference_speed_wraps``: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
     * ``reference_start_counts_on``: RM continues the count of samples of the previous RM, instead
       of counting from 0. A failed RM is answered with the error of the last F or B, not of RM.

@@ -59,8 +59,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wakes-while-booting",
         action="store_true",
-        help="let bytes that arrive during the boot wake the receiver, which needs three bytes;"
-        " without this option, such bytes are lost",
+        help="let bytes that arrive during the boot count among the three bytes that wake the"
+        " receiver; without this option, only later bytes count",
     )
     parser.add_argument(
         "--ignore-estop", action="store_true", help="simulate a firmware without emergency stop"
