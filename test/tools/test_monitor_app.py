@@ -93,7 +93,7 @@ def test_a_latched_estop_is_red() -> None:
         robot.shown = view(estop=True, releasable=False)
         app.refresh_view()
         await pilot.pause()
-        assert "E-STOP LATCHED  ·  waiting for the service that releases it" in screen(app)[1]
+        assert "E-STOP LATCHED  ·  waiting for the driver's e-stop service" in screen(app)[1]
         robot.shown = view(estop=True)
         app.refresh_view()
         await pilot.pause()

@@ -128,9 +128,9 @@ def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     raise ToolError(
         "the odometry contradicts itself: the robot drove forward before and after a turn of"
         f" {math.degrees(turned_rad):.0f}°. By the odometry, the directions of these two drives in"
-        f" the body's axes differ by {math.degrees(change_rad):.0f}°. They should differ by 0°, or"
-        " by the angle of the turn if delta_frame is wrong. See /diagnostics, and"
-        " docs/internals/omnibot_protocol.md"
+        f" the body's axes differ by {math.degrees(change_rad):.0f}°. The difference"
+        " should be 0°; with a wrong delta_frame, it would be the angle of the turn. See"
+        " /diagnostics, and docs/internals/omnibot_protocol.md"
     )
 
 

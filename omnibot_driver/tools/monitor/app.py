@@ -151,8 +151,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        The empty ``suspend`` block ends the thread that reads keys. Textual then draws the screen,
-        and starts a new thread that reads keys. Without the block, two threads would read keys.
+        Textual's ``suspend`` ends the thread that reads keys. After the empty block, Textual draws
+        the screen, and starts a new such thread. Without ``suspend``, two threads would read keys.
         """
         with self.suspend():
             pass
@@ -166,7 +166,7 @@ class Monitor(App[None]):
         self._show_title(view)
         line = self._parts["estop"]
         line.set_class(bool(view.estop) or view.estop_asked, "latched")
-        hint = "R releases it" if view.releasable else "waiting for the service that releases it"
+        hint = "R releases it" if view.releasable else "waiting for the driver's e-stop service"
         line.update(f"{text.estop(view)}  ·  {hint}" if view.estop else text.estop(view))
         self._show_path(view)
         self._parts["figures"].update(Text("\n".join(text.figures(view))))

@@ -55,7 +55,7 @@ class DeadMan:
     def __init__(self) -> None:
         self.level = 3
         self.fastest = (0.5, 0.5)
-        """Linear speed in m/s and angular speed in rad/s at the highest level."""
+        """Linear speed in m/s and angular speed in rad/s at the highest speed level."""
         self.has_driven = False
         self._held = NOTHING
         self._zeros = 0
