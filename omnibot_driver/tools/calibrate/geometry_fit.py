@@ -125,7 +125,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 def _rolled(rims: Column, factors: Column, base_radius_m: float) -> Column:
     """Return the poses of a path from the origin, (n, 3): the origin, then one pose for each step.
 
-    ``rims``: distances of the wheels in the steps with the assumed radii, in m, (n - 1, 3).
+    ``rims``: distance that each wheel rolls in each step, by the assumed radii, in m, (n - 1, 3).
     """
     body = rims * factors @ np.linalg.inv(_rims(base_radius_m)).T
     yaw = np.concatenate(([0.0], np.cumsum(body[:, 2])))

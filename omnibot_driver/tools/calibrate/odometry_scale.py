@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LINES: Final = 2
-"""Number of straight drives. If the user measures one of them wrongly, their results differ."""
+"""Number of straight drives. A wrong measurement by the user shows as a difference of the
+results."""
 UNLIKE: Final = 4.0
 """Limit for the difference between the results of two drives of the same kind, in standard
 deviations of the difference. The tool warns if the difference is larger."""

@@ -36,7 +36,7 @@ class Measured:
 
     @property
     def overshoot(self) -> float:
-        """Overshoot of the steps' mean, smoothed over 0.2 s, as a fraction of the final speed."""
+        """Overshoot of the mean step, smoothed over 0.2 s, as a fraction of the final speed."""
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
         calm = np.convolve(mean, np.full(10, 0.1), "valid")

@@ -4,7 +4,7 @@
 
 1. Record steps with the current gains.
 2. Measure the levels of each encoder's signal at a constant duty.
-3. Fit each plant (motor with wheel) to starts at full duty.
+3. Start the motors at full duty, and fit each plant (motor with wheel) to the recorded ticks.
 4. In several rounds: compute gains, record steps, fit the dead time.
 """
 

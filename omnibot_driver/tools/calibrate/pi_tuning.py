@@ -2,7 +2,7 @@
 
 """Find gains of a band-limited PI controller that suit a plant.
 
-This module also finds the dead time of the plant that explains recorded steps best.
+This module also finds the plant's dead time, from recorded steps.
 """
 
 from collections.abc import Sequence
@@ -35,8 +35,9 @@ BEGUN: Final = np.array([0.0, 0.4, 0.8])
 """Starting positions of a simulated wheel between two encoder ticks, as fractions of a tick. They
 decide in which control period a tick arrives."""
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Times in a simulated step at which the board first sends tick counts, as fractions of the sending
-period. While the board sends, it notices encoder ticks late."""
+"""Times at which the board begins to send tick counts in a simulated step, as fractions of the
+sending period. Each of these times is simulated. While the board sends, it notices encoder ticks
+late."""
 DISTURBED: Final = 0.02
 """Additional overshoot, as a fraction of the speed, that is allowed if the board sends its tick
 counts during a step."""
@@ -55,7 +56,8 @@ class Goals:
     * ``band``: largest deviation of a settled step, as a fraction of the final speed.
     * ``destination``: set-point, as a fraction of the speed at full duty.
     * ``settled_s``: settling time above which the tool warns, in s.
-    * ``phase_margin_deg``: smallest phase margin. None: Td is 0, and the overshoot limits the gain.
+    * ``phase_margin_deg``: smallest phase margin. With None, Td is 0, and ``overshoot`` limits the
+      gain.
     """
 
     overshoot: float = 0.05
@@ -124,10 +126,7 @@ def target_of(plant: Plant, goals: Goals) -> float:
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Return ``gains``, and the predicted effect of these gains on a step of the speed.
-
-    The step leads to the set-point that the function ``target_of`` returns.
-    """
+    """Return ``gains``, and their predicted effect on a step to the set-point (``target_of``)."""
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(

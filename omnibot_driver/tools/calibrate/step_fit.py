@@ -68,8 +68,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the mean rate in rad/s that a model predicts for each odometry delta of the step.
 
-        ``mean``: a function that returns the model's mean rate in each delta after a unit step. The
-        argument of the function is an array with the end of each delta, in ticks after the step.
+        ``mean``: the model's response to a unit step. This function takes the ends of the deltas,
+        in ticks after the step, and returns the mean rate in each delta.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps

@@ -85,7 +85,9 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the number of the mark at which a record begins: where ``row`` fits ``steps`` best.
+    """Return the number of the mark at which a record begins.
+
+    From this mark on, ``row`` fits ``steps`` best.
 
     * ``row``: relative errors of the record's times between ticks.
     * ``steps``: relative errors of the distances from each mark to the next.
@@ -102,9 +104,8 @@ def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     * ``rows``: for each record, the relative errors of its times between ticks.
     * ``firsts``: for each record, the number of its first mark.
 
-    All times that begin at the same mark cover the same distance. The distance's error is the
-    median of the errors of these times. The mean of all medians is then subtracted from each
-    median.
+    All times from the same mark to the next cover the same distance. The error of this distance is
+    the median of the errors of these times, minus the mean of all medians.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Read records of the times between a wheel's ticks, and measure the encoder's levels.
+"""Read recorded times between a wheel's ticks, and measure the two levels of its encoder signal.
 
-A record is a CSV file of the driver. This module does not know the plant.
+A record is a CSV file of the driver. This module uses no model of the plant (motor with wheel).
 """
 
 import csv
@@ -53,9 +53,10 @@ def read(path: Path) -> dict[str, Column]:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Corrections of the two levels of an encoder's signal, for one wheel.
+    """Correction factors for the short and long levels of one wheel's encoder signal.
 
-    * ``short``, ``long``: factors that give both levels the same duration.
+    * ``short``, ``long``: factors for the durations of the levels, which make these durations
+      equal.
     * ``sigma``: standard deviation of the factors.
     * ``rpm``: speed during the measurement.
     """

@@ -45,14 +45,14 @@ LAGS: Final = 60
 """Largest distance between two residuals, in ticks, at which their correlation is considered. The
 slow changes of the load correlate distant residuals."""
 MISSED: Final = 0.42
-"""Limit for the sum of the relative errors of two successive times between encoder ticks.
+"""Limit for the sum of the relative errors of two successive intervals between encoder ticks.
 
-The board has missed a mark of the encoder during the first time if the sum is above this limit, and
-the error of the first time is above half of this limit.
+The board has missed a mark of the encoder in the first interval if the sum is above this limit, and
+the error of the first interval is above half of this limit.
 
-* If the board has missed a mark, the first time is twice as long as expected. So the sum is about
-  1, or smaller if the board's clock loses up to 6 ms.
-* If the board has noticed a mark late, the first time is too long, and the second time is too short
+* If the board has missed a mark, the first interval is twice as long as expected. So the sum is
+  about 1, or smaller if the board's clock loses up to 6 ms.
+* If the board has noticed a mark late, the first interval is too long, and the second is too short
   by the same amount. So the sum is near 0.
 """
 SURE_TICKS: Final = 4
@@ -77,7 +77,7 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def constants(values: Column, order: int) -> tuple[float, float]:
-    """Return the slow and the fast time constant, in s, for the values of a search.
+    """Return the slow and the fast time constant, in s, from the values that a ``Search`` fits.
 
     The values contain the sum and the ratio of the constants, because exchanged constants describe
     the same plant.
@@ -176,7 +176,7 @@ class Search:
         return self._rows(self._measured / self._told(values, np.zeros(1)) - 1.0)
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
-        """Fit the plant together with the marks' positions; return only the plant's values.
+        """Fit the plant and the positions of the encoder's marks; return the plant's values.
 
         All later searches use the fitted positions. ``marks``: the positions from which the fit
         starts.
@@ -204,7 +204,7 @@ class Search:
     def left(self, values: Column) -> Column:
         """Return the relative residuals for ``values``, without outliers.
 
-        A correlation that ``correlate`` has measured is removed.
+        If ``correlate`` has measured the correlation of the residuals, this correlation is removed.
         """
         left = self._residuals(values) * self._sigma
         return np.asarray(left[np.abs(left) < 5 * max(_spread(left), 1e-3)])
@@ -290,11 +290,10 @@ class Search:
         return np.split(of_all, np.cumsum(self._lengths)[:-1])
 
     def _told(self, values: Column, off: Column | None = None) -> Column:
-        """Return the predicted times between ticks in s, record after record.
+        """Return the times between ticks that ``values`` predict, in s, record after record.
 
         ``off``: for each mark on the encoder's disc, the offset from its evenly spaced position, in
-        ticks. If ``off`` is None, the offsets in ``values`` are used. If ``values`` contains no
-        offsets, those of an earlier fit are used.
+        ticks. None: the offsets in ``values``, or those of an earlier fit if ``values`` has none.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

@@ -16,10 +16,10 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after which a report on /diagnostics proves that the driver was still running.
+"""Time in s after which a report of the same state proves that the driver was still running.
 
-The time counts from the beginning of the log's last state, and the report must contain this state.
-If there is no such report, and the last state is "disconnected", the driver has ended.
+The time counts from the beginning of the last state in the recorded log. If /diagnostics does not
+report this state after that time, and the state is "disconnected", the driver had ended.
 """
 
 

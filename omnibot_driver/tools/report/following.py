@@ -41,8 +41,8 @@ SLOW_START_S: Final = 3.0
 """Time limit in s for standstills of a robot with two driving wheels that is commanded to move.
 
 Until the limit, the front wheel may still have to turn, or the motors may start slowly. Longer
-standstills are reported. The lengths of several standstills are added if the robot did not move
-between them.
+standstills are reported. If several commands in a row do not move the robot, the lengths of the
+standstills are added.
 """
 AFTER_STOP_S: Final = 1.5
 """Time in s within which the robot must come to rest after an e-stop, or after the last command has
@@ -59,8 +59,8 @@ class Answer:
 
     ``error``: for each axis, rms of measured - gain · commanded motion.
 
-    ``spread``: for each axis, ``error`` / rms of the command. ``spread`` is infinite if no command
-    was constant for long enough: in this case, the gain also depends on how fast the motors react.
+    ``spread``: for each axis, ``error`` / rms of the command. If no command was constant for long
+    enough, the gain also depends on how fast the motors react, and ``spread`` is infinite.
     """
 
     lag_s: float
@@ -206,7 +206,7 @@ def _stopped(log: Log, at_s: Array) -> Mask:
 
 
 def _sustained(times_s: Array, rows: Mask) -> list[Span]:
-    """Return the spans of time of at least 1 s (``SUSTAINED_S``) in which ``rows`` stays true."""
+    """Return the spans of at least 1 s (``SUSTAINED_S``) in which ``rows`` is always true."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]

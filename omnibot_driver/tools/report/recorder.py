@@ -159,7 +159,7 @@ class Recorder:
     ) -> Log:
         """Return a log of all messages, in the order of arrival.
 
-        ``topics``: the roles whose topics exist.
+        ``topics``: names, without namespace, of the topics that exist. Empty if unknown.
 
         There must be at least one message.
         """
@@ -201,7 +201,7 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Return the spans of time in which the text for a topic's value stayed the same.
 
-        ``name``: function that converts a value to its text (``what`` of a span).
+        ``name``: function that converts a value to its text, which becomes ``Span.what``.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

@@ -118,10 +118,12 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step between two timestamps, the end of its group of steps.
 
-    A group begins with its long step, and ends before the next long step or after ``most`` steps
-    (at least one). No message is missing if the steps after the long step are short enough to make
-    up for the long step. The returned end is the index after the last step of the group. ``wide``:
-    indices of the long steps.
+    A group contains the long step and the steps after it. If the later steps are short enough to
+    make up for the long step, no message is missing. The group ends before the next long step, and
+    has at most ``most`` steps (one if ``most`` is 0). The returned end is the index after the last
+    step.
+
+    ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

@@ -44,8 +44,8 @@ class Steps:
 
     ``off_m``, ``off_rad``: difference between the change of the pose and the motion by the twist.
 
-    ``leap``: whether this difference is too large. In a gap, the twist does not show the motion, so
-    only a step to the zero pose can be a leap.
+    ``leap``: whether this difference is too large. A large difference is usual in a gap, so there
+    only a step to the zero pose is a leap.
 
     ``reset``: whether the step is a leap to the zero pose.
     """
