@@ -18,8 +18,7 @@ NOT_POLLABLE: Final = (
     " /dev/ttyACM0, or sim:// for all ports"
 )
 NONE_MISSING: Final[Mapping[int, str]] = {}
-"""Value of ``missing`` for a transport of which no line is missing. This is also the value if
-all lines are closed."""
+"""Value of ``missing`` if no line is missing, and after the transport was closed."""
 
 
 class LinesChanged(Exception):

@@ -39,7 +39,7 @@ class HostName:
     def has_moved(self) -> bool:
         """Return whether the host is silent and its name no longer leads to the address in use.
 
-        A lookup that is due begins, and the call does not wait for it.
+        A due lookup begins in the background; a later call returns its result.
         """
         now = time.monotonic()
         if not self._is_name or now < self._heard_s + SILENT_S:

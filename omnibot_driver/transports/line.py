@@ -68,8 +68,10 @@ class Line:
         """Write the waiting bytes, then ``data``; return False if bytes have waited for 0.2 s.
 
         If the result is False, the waiting bytes are discarded, and the caller must regard the line
-        as missing. If the line is already missing, the result is True. If the port of a missing
-        line is still open, the port gets only the part of ``data`` that it accepts at once.
+        as missing.
+
+        For a line that is already missing, the result is True. Its port may still be open, and then
+        gets only the part of ``data`` that it accepts at once.
         """
         if self.port is None:
             return True

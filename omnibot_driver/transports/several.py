@@ -2,12 +2,11 @@
 
 """Several lines of bytes as one transport; each line is one channel.
 
-If a line is missing or blocked, the others still work. Missing lines are opened again.
+If a line is missing or blocked, the other lines still work. Missing lines are opened again.
 
-There is one exception. The *leading* line is the one whose device has the first path in
-alphabetical order. If another program uses it, and this transport has not opened it before, the
-transport gives up the other lines too. So if two drivers wait for the same lines, in any order, one
-of them gets all lines.
+The *leading* line is the one whose device has the first path in alphabetical order. If another
+program uses the leading line before this transport has opened it, this transport gives up all
+lines. So if two drivers wait for the same lines, in any order, one of them gets all lines.
 """
 
 import os

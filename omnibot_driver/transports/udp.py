@@ -2,7 +2,7 @@
 
 """Datagrams to one host: ``udp://host:port``. Each further channel uses the next higher port.
 
-A silent host is an error only if its name has got another address.
+If the name of a silent host has a new address, ``read`` raises LinkError.
 """
 
 import contextlib

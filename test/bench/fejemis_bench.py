@@ -110,7 +110,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return the times that the driver takes to relay the angles, in ms, as a sorted list.
+    """Return the sorted times in ms that the driver takes to relay the front wheel's angle.
 
     ``busy``: number of other processes that compute during the measurement. Angles of the first 3 s
     are left out.

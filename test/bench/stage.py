@@ -39,7 +39,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3
 
 
 def number_of(tick: int) -> int:
-    """Return the number in the IMU frame of this tick."""
+    """Return the frame number in this tick's IMU frame."""
     return TURN - abs(TURN - tick % (2 * TURN))
 
 

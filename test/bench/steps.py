@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays of a board's data, each with one more task than the relay before.
+"""Programs that relay a board's data, each with one task more than the previous one.
 
-Each has more tasks than the floor (the smallest program with the driver's output), and fewer than
-the driver. Arguments: a key of STEPS, the port, the namespace. Nothing is written to the port.
+Each program has more tasks than the floor (the smallest program with the driver's output), and
+fewer than the driver. Arguments: a key of STEPS, the port, the namespace. Nothing is written to the
+port.
 """
 
 import os

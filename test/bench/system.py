@@ -50,7 +50,7 @@ MPS2_PER_COUNT = 9.80665 / 16384
 
 
 def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
-    """Measure the latency from the terminal to the callback, the processor time, and the memory."""
+    """Measure the latency from pseudo-terminal to callback, the processor time, and the memory."""
     with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear("ours", "floor"))
         programs = [

@@ -68,7 +68,7 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """A wheel command with a wrong number of rates is rejected. The error gives this number."""
+    """A wheel command with 0, 2 or 4 rates is rejected, with this number in the error."""
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)

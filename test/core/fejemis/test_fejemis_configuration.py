@@ -266,9 +266,9 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
 
 
 def test_a_board_that_is_not_known_yet_is_named_by_its_port() -> None:
-    """A line comes before the first heartbeat, and contradicts the user's setting for checksums.
+    """A line contradicts the user's setting for checksums before the first heartbeat.
 
-    The advice names the board that ``port`` is for.
+    The advice names the board at whose port the line came.
     """
     board = FejemisBoard(FejemisSettings(line_sums="on"))
     board.connect()

@@ -326,8 +326,8 @@ def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() ->
 def test_a_board_that_restarts_at_the_port_of_the_other_is_named(half: str) -> None:
     """Each board is connected to the port of the other board, and one board restarts.
 
-    Its start message arrives before its first heartbeat. The driver reports the restart of this
-    board as soon as this heartbeat arrives, and no restart of the other board.
+    The start message of this board arrives before its first heartbeat. As soon as the heartbeat
+    arrives, the driver reports that this board, and only this board, has restarted.
     """
     bench = nominal()
     bench.close()

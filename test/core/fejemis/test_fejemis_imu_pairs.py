@@ -237,7 +237,7 @@ pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
 def test_every_sample_is_given_in_pieces(
     layout: Layout, chance: random.Random, pauses_s: list[float]
 ) -> None:
-    """No line is lost, but the bytes arrive in small pieces, perhaps slower than they are sent.
+    """No line is lost, but the bytes arrive in small pieces, perhaps over a slow connection.
 
     Every sample is found.
     """
@@ -283,8 +283,8 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, repeated or late. The driver still pairs only lines of the same sample.
 
-    The only exception is a wrong pair that nothing in the stream shows: the first line of the pair
-    is late, the second line is read less than 5 ms later, and no pose follows in the same read.
+    A wrong pair is allowed only if nothing in the stream shows the error: its first line is late,
+    its second line is read less than 5 ms later, and no pose follows in the same read.
 
     ``period_s``: period of the reads in s, which must differ from the period of the samples. If it
     is None, each line is read as soon as it arrives, except while the host is busy.
@@ -322,8 +322,8 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
     """The samples at the beginning of a late read are published.
 
-    The time before a late read looks like a silence of the board. So the driver holds these samples
-    until the next pose shows that no samples are missing.
+    Before a late read, no lines come, so samples may have been lost. The driver holds the samples
+    back until the next pose shows that no samples are missing.
     """
     bench = nominal()
     bench.run(3.0)

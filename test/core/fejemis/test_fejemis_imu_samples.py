@@ -48,7 +48,7 @@ def test_samples_that_waited_for_seconds_have_the_times_at_which_they_were_taken
 def test_two_late_samples_do_not_shift_the_sampling_times_of_the_next_ones() -> None:
     """Two late samples do not shift the sampling times of the next ones.
 
-    The driver could assume a lost sample instead. But then the third sample would have arrived 3 ms
+    The delay could also mean a lost sample. But the third sample would then have arrived 3 ms
     before the board took it, which is impossible.
     """
     late_s = {200: 0.017, 201: 0.017, 202: 0.007}

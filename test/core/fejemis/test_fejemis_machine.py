@@ -36,7 +36,7 @@ def test_the_lift_runs_no_longer_than_a_command() -> None:
 
 
 def test_the_time_of_the_lift_follows_the_timeout() -> None:
-    """The time limit of each lift voltage is at most ``command_timeout_s``."""
+    """Each lift voltage is commanded for at most ``command_timeout_s``."""
     bench = nominal(settings=FejemisSettings(command_timeout_s=0.2))
     lift_it(bench, -6.0)
     said = [text for text in bench.lines(FRONT) if text.startswith("motv -")]

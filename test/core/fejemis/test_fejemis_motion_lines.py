@@ -115,10 +115,10 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A stop line, ``rc 2 0 0``, and the next line lose two characters. No false motion is read.
+    """A stop line, ``rc 2 0 0``, and the next line together lose two characters.
 
-    The driver writes an empty line between the two lines. Otherwise the checksum of the second
-    line, for example 92, could continue a number of the stop line: ``rc 2 0 092``.
+    No false motion is read, because an empty line separates the two lines. Otherwise the loss of
+    the line end and ``;`` could join the next line's checksum to the stop line: ``rc 2 0 092``.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -180,7 +180,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """A lift line loses one or two characters. Its voltage and its duration do not increase.
 
-    The complete line commands 45 to 100 % of the requested voltage.
+    The undamaged line has 45 to 100 % of the requested voltage.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)

@@ -56,8 +56,8 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 def test_the_end_of_a_job_does_not_confirm_a_start(*, closes: bool) -> None:
     """After a request to power off, the boards become silent. Then the user calls ~/start.
 
-    The power off fails, but this does not confirm ~/start. ``closes``: whether the ports close
-    right after the call of ~/start.
+    The power off fails, and ~/start is not confirmed. ``closes``: whether the ports close right
+    after the call of ~/start.
     """
     bench = nominal()
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -279,9 +279,9 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """The driver increases the delay of a power off until the loss of any two digits is detected.
+    """For a power off, the driver sends a delay whose checksum shows the loss of any two digits.
 
-    For example, it sends ``off 311`` instead of ``off 300``, because the checksum of ``off 300``
-    would not show the loss of 3 and 0.
+    If necessary, the driver sends a longer delay: ``off 311`` instead of ``off 300``, because the
+    checksum of ``off 300`` would not show the loss of 3 and 0.
     """
     assert whole_seconds(wanted_s) == seconds

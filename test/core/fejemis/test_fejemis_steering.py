@@ -277,9 +277,10 @@ def test_a_refused_reverse_is_not_driven_when_it_is_allowed_later() -> None:
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
-    """The robot follows a curve backward with a firmware that mirrors the front wheel's angle.
+    """The robot follows a curve backward. Its firmware is the variant "mirrored".
 
-    The front wheel then has the same angle as if the robot followed this curve forward.
+    In reverse, this variant gives the front wheel the same angle as for driving forward on the same
+    curve.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)

@@ -193,8 +193,8 @@ class Rig:
 
     ``reads_s``: least and greatest time between two reads of the driver, in s.
 
-    ``own_periods``: whether the board keeps its own periods of the reports if ``ours`` has no
-    periods.
+    ``own_periods``: if ``ours`` has no report periods, whether the board keeps its own periods, or
+    gets ``USUAL_PERIODS_MS``.
     """
 
     def __init__(

@@ -151,9 +151,9 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """If a tick report, or the odometry report after it, loses a line, the other one is decoded.
+    """A tick report and an odometry report come together, and one text line is lost.
 
-    The board sends both reports with the same command byte.
+    The decoder returns the complete report, although both reports have the same command byte.
     """
     decoder = LoisDecoder()
     found: list[Report] = []
@@ -312,8 +312,8 @@ def test_a_line_that_lost_two_characters_is_no_line_without_a_checksum() -> None
 def test_half_an_odometry_group_of_zeros_is_not_a_report_of_ticks() -> None:
     """An odometry group contains only zeros, and the driver reads its second half late.
 
-    The decoder does not regard this half as a tick report. Regression: a tick report of zeros, with
-    a clock of 0, showed a restart of the board.
+    The decoder does not regard this half as a tick report. Regression: such a tick report, with a
+    clock of 0, seemed to show a restart.
     """
     ticks, odometry = Ticks(4317, 0, 0), BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     decoder = LoisDecoder()

@@ -49,7 +49,7 @@ class Reports:
         * ``ticks``: newly counted ticks of the left and the right wheel.
         * ``still``: whether the board repeats its last odometry report, because no wheel has
           ticked.
-        * ``passed_s``: time in s for which the board has moved its pose with ``rpm``, unless
+        * ``passed_s``: time in s that the board assumes for the motion at ``rpm``; unused if
           ``still``.
         """
         self._now += PERIOD_S
@@ -132,9 +132,10 @@ def test_speeds_after_a_change_of_sign_show_how_far_a_wheel_rolls_out() -> None:
 
 
 def test_wheels_that_roll_out_backward_do_not_move_forward_by_their_ticks() -> None:
-    """After a change from backward to forward, ticks of wheels that roll out are backward motion.
+    """After a change from backward to forward, ticks of coasting wheels count as backward motion.
 
-    The board counts them upward, but its speeds show that the wheels still roll backward.
+    The board counts these ticks upward and reports forward speeds, but the wheels still roll
+    backward.
     """
     reports = Reports()
     reports.order(-20, -20)

@@ -160,9 +160,9 @@ def test_no_setting_that_waited_for_a_stop_follows_it_directly(waited_s: float) 
 
 @pytest.mark.parametrize("with_sum", [True, False])
 def test_a_recovery_that_waited_for_a_stop_follows_it_after_a_pause(with_sum: bool) -> None:
-    """No GPS date arrives in a long drive. After the Stop, the driver restores the board's mode.
+    """No GPS date arrives in a long drive. Perhaps the board does not obey.
 
-    The missing date may mean that the board does not obey. The driver writes the mode 15 ms after
+    So after the Stop, the driver restores the board's mode. The driver writes the mode 15 ms after
     the Stop, and writes no setting together with the mode.
 
     Regression: the driver wrote the mode directly after the Stop.

@@ -91,7 +91,7 @@ def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
 def test_if_every_read_is_late_the_times_do_not_drift() -> None:
     """Every read is late, and the board's clock is slow by 0.5 % for 20 min.
 
-    The last report of each read still gets the time of the read: the estimated times do not drift.
+    The estimated times do not fall behind: the last report of each read gets the time of this read.
     """
     late_reads = listening()
     for number in range(2000):
@@ -127,7 +127,7 @@ def test_the_clock_after_a_restart_is_not_slowed_by_sending() -> None:
 def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
     """If a clock in ns is near zero, the reports get the time of the read.
 
-    The clock is near zero after a restart, but also after each wrap.
+    The driver cannot tell whether the board has restarted or the clock has wrapped.
     """
     late_reads = listening("ns")
     found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))

@@ -109,9 +109,9 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 
 
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
-    """The covariance includes that a wheel with a constant reported speed may be at rest.
+    """If most reports are lost, the heading's covariance allows for a wheel at rest.
 
-    The board repeats the last speed of a wheel at rest, and most reports are lost.
+    The board repeats the last speed of a wheel at rest, so a constant speed may mean rest.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -148,9 +148,9 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 def test_a_large_correction_by_the_heading_of_0x20_is_not_exact(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The covariance includes the error of a large correction by the heading in 0x20.
+    """After a large correction by the board's heading (0x20), the covariance includes an error.
 
-    The filter is linear, but the motion of starting wheels is not.
+    A linear filter cannot follow starting wheels exactly.
     """
 
     def stddev_deg() -> float:

@@ -49,10 +49,9 @@ def longest_gap_s(bench: Bench, ours: LoisEcuSettings) -> float:
 def test_ticks_keep_coming_while_many_settings_are_written(firmware: str, ticks_ms: int) -> None:
     """A setting changes while the robot drives. The driver writes all settings in several rounds.
 
-    When the period of the ticks is written, the board begins this period anew, so the next tick is
-    delayed. Without ticks between the rounds, the driver would refuse motion, or regard the board
-    as lost and begin the rounds again, without end. But the ticks keep coming, and they finally
-    confirm the settings, while the robot still drives.
+    Each time the driver writes the period of the ticks, the next tick report is delayed. But the
+    tick reports come often enough: the driver does not regard the board as lost, and does not
+    refuse motion. The reports finally confirm the settings, while the robot still drives.
     """
     ours = replace(ALL, periods_ms={Stream.TICKS: ticks_ms, **SLOW})
     bench = Bench(firmware, ours)
@@ -74,8 +73,8 @@ def periods_written(bench: Bench, ticks_ms: int) -> int:
 def test_a_long_period_is_written_four_times() -> None:
     """The driver writes a period of 0.5 s for the tick reports at least four times.
 
-    A line may be lost, and the driver cannot detect the loss: tick reports with the board's own
-    period of 0.4 s come at nearly the same rate.
+    A text line may be lost, and the driver cannot detect the loss: tick reports with the board's
+    own period of 0.4 s come at nearly the same rate.
     """
     bench = Bench("firmware", own_periods=True)
     bench.run(5.0)

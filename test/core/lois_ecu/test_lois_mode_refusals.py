@@ -88,10 +88,10 @@ def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
 
 
 def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
-    """The user sets a drive mode and a terminal mode, and then takes the terminal mode back.
+    """The user changes the drive mode and the terminal mode, and then undoes the second change.
 
-    The driver goes on stopping the robot, because the drive mode can change only at rest. Until
-    then, the driver refuses motion, and names only the drive mode as the reason.
+    The driver still stops the robot, because the drive mode can change only at rest. During this
+    stop, the driver refuses motion, and names only the drive mode as the reason.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 2.0)

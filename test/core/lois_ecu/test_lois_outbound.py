@@ -135,9 +135,9 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_a_stop_to_a_setting_after_it() -> None:
     """The loss of 14 adjacent characters can turn a Stop and a setting into a full-duty command.
 
-    If the Stop comes first, its beginning can join the end of the setting (low-pass coefficient).
-    The board may lose all characters for up to 13 ms, so the driver sends a setting at least 15 ms
-    after a set-point. If the setting comes first, there is no danger.
+    This is possible only if the Stop comes first: the Stop's beginning then joins the end of the
+    setting (low-pass coefficient). The board loses characters for at most 13 ms. So the driver
+    sends a setting at least 15 ms after a set-point.
     """
     stop = encode_command(STOP)
     low_pass = encode_command(WriteSetting(Setting.RPM_LOW_PASS, 1.0))
@@ -153,9 +153,9 @@ def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_
 ) -> None:
     """The loss of adjacent characters can turn a motion line and an LED line into a wrong motion.
 
-    If the motion line comes first, its beginning can join the end of the LED line. The board may
-    lose all characters for up to 13 ms, so the driver sends an LED line at least 15 ms after a
-    motion line. If the LED line comes first, there is no danger.
+    This is possible only if the motion line comes first: the motion line's beginning then joins the
+    end of the LED line. The board loses characters for at most 13 ms. So the driver sends an LED
+    line at least 15 ms after a motion line.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

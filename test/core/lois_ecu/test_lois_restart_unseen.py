@@ -107,8 +107,8 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
     """The board restarts just when its clock wraps, and the covariance covers the odometry's error.
 
-    The driver does not notice the restart: wheels that roll back to their start would lead to the
-    same clock and the same tick counts.
+    The driver does not notice the restart: if the wheels had rolled back to their start, clock and
+    tick counts would be the same.
     """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.3, 0.0)

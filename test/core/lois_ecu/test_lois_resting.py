@@ -65,7 +65,7 @@ def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """The board reports 20 RPM more than fifty times, and has never reported a higher speed.
+    """The board reports a speed of 20 RPM over fifty times, and never a higher speed.
 
     The detector assumes that the wheel rolls.
     """
@@ -82,9 +82,9 @@ def test_one_tick_that_came_late_is_not_a_fall() -> None:
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """A speed below 4.5 or above 23.5 RPM that is repeated three times does not show rest.
+    """Three repetitions of a speed below 4.5 or above 23.5 RPM do not show rest.
 
-    The reason is that few wheels come to rest from such a speed.
+    The board repeats a stopped wheel's last speed, which is rarely such a speed.
     """
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
@@ -101,8 +101,8 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
     """The detector finds a wheel at rest although the board has not reported the fall of its speed.
 
     The board reports no speeds while both wheels have the same speed, and the driver estimates 28
-    RPM. Then the board reports 14 RPM three times. The equal reports make the detector certain: the
-    board repeats the last speed of a stopped wheel.
+    RPM. Then the board reports 14 RPM three times: the speed has fallen, and the board repeats the
+    last speed of a stopped wheel.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):
@@ -135,8 +135,8 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
     """If most reports are lost, eleven equal reports make the detector certain of a wheel's rest.
 
-    The lost reports may have shown a fall of the speed, and the board repeats the last speed of a
-    stopped wheel. If no report is lost, the same speeds do not show rest.
+    The board repeats the last speed of a stopped wheel, and the fall to this speed may be among the
+    lost reports. If no report is lost, the same speeds do not show rest.
     """
     speeds = (13, 13, 13, 14)
     assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2

@@ -47,7 +47,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 def test_a_release_without_a_press_latches_the_estop(firmware: str) -> None:
     """A reported release of the e-stop button latches the e-stop if its press was not reported.
 
-    While the board sends a record, it does not report the press.
+    The board does not report a press during a record. Only the release shows the press.
     """
     bench = Bench(firmware)
     bench.drive_on(0.6, 1.0)

@@ -50,7 +50,7 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
 
 
 def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> None:
-    """The detector reports a wheel that is commanded forward but does not tick, once every 2 s."""
+    """Every 2 s, the detector reports a wheel that is commanded forward but does not tick."""
     assert watched(SetRpm(20, 10), ticks=(3, 0), ways_m=0.1) == [2.0, 4.0, 6.0]
 
 
@@ -128,10 +128,11 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a wheel at a constant speed above its set-point does not look stalled.
+    """With feed-forward, a constant reported speed above the set-point does not show a stall.
 
-    Feed-forward gives power at any speed, so the wheel may roll. But if the other wheel's speed
-    changes meanwhile, the constant speed shows that the wheel is stalled.
+    Feed-forward gives power at any speed, so the wheel may roll at this speed. But if the other
+    wheel's reported speed changes meanwhile, the wheel is stalled: the board repeats the last speed
+    of a wheel at rest.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -200,12 +201,12 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
 
     The driver provides for both cases:
 
-    * If the wheel is at rest, the board may use the wheel's old speed, and give the motor no power.
+    * If the wheel is at rest, the reported speed is old, and the board may give the motor no power.
       So the driver sends RPM 0/0, which clears this speed.
     * If the wheel rolls, the robot has driven. So the odometry keeps the driven distance.
 
-    ``right_rpm``: reported speed of the right wheel, in RPM. The set-point is −31 RPM. A wheel with
-    this set-point rolls at −30 RPM, or at −68 RPM if the controller gives full power.
+    ``right_rpm``: reported speed of the right wheel, in RPM. The set-point is −31 RPM, at which the
+    wheel rolls at −30 RPM, or at −68 RPM if the controller gives full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

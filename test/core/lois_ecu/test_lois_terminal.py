@@ -146,9 +146,9 @@ def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """In a terminal mode, the board obeys an e-stop.
+    """While ``terminal_mode`` is gps, the board obeys an e-stop.
 
-    After the release of the e-stop, the driver still refuses motion, because of the terminal mode.
+    After the release of the e-stop, the driver still refuses motion, because of this mode.
     """
     bench = Bench(firmware)
     configure(bench, GPS)

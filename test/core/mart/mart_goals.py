@@ -37,9 +37,9 @@ EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
 def on(
     network: NetworkFaults, firmware: Firmware, seed: int = 0, after_s: float = 0.0
 ) -> MartBench:
-    """Return a bench that is ready to drive. Its network has the faults ``network``.
+    """Return a bench that is ready to drive, with the faults ``network`` in its network.
 
-    ``after_s``: how long the network is good while the bench is ready, in s.
+    ``after_s``: time in s from when the bench is ready until the faults begin.
     """
     bench = MartBench(firmware, seed=seed).ready()
     bench.run(after_s)

@@ -25,12 +25,12 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong with the server or the robot, or an empty text if nothing is wrong.
 
-    * In every state, a crash of the server is wrong.
-    * If the IMU works, and the driver has not given the server up (as lost, or after more than
-      ``UNANSWERED`` stops without an answer), a command port that hangs is wrong, too.
-    * If, in addition, the driver is not finding out which motion is in progress, three more cases
-      are wrong: the next stop will hang, the server refuses motions and the driver does not know
-      this, or nothing stops the robot.
+    * Always wrong: the server has crashed.
+    * Wrong if the IMU works and the driver has not given the server up: the command port hangs. The
+      driver gives the server up as lost, or after more than ``UNANSWERED`` stops without an answer.
+    * Wrong in the same case, except while the driver is finding out which motion is in progress:
+      the next stop will hang, the server refuses motions and the driver does not know this, or
+      nothing stops the robot.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -77,8 +77,10 @@ def _can_stop(world: World) -> bool:
 class Found(NamedTuple):
     """The result of a search.
 
-    * ``worlds``, ``steps``: how many worlds are reachable, and how many steps connect them.
-    * ``bad``: the steps to the first forbidden world, then its fault. Empty if none was found.
+    * ``worlds``, ``steps``: number of reachable worlds (states of server, driver and network), and
+      of steps between them.
+    * ``bad``: the steps to the first forbidden world, then what is wrong in it. Empty if none was
+      found.
     """
 
     worlds: int

@@ -112,7 +112,7 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 def servers() -> dict[Server, tuple[str, ...]]:
     """Return all states that the server can reach without lost datagrams, with the steps to each.
 
-    A step is a command, or a failure of the IMU, which does not occur during a controlled move.
+    A step is a command or, except during a controlled move, a failure of the IMU.
     """
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}

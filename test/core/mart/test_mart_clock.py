@@ -56,10 +56,10 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 
 
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
-    """If the server's clock may be set back, the driver sets the clock at once, to the time in UTC.
+    """Before the first drive, the driver sets the server's clock (UTC) without waiting.
 
-    The clock may be set back only before the first drive. Later, the driver waits for the end of a
-    minute.
+    TIME sets the clock to a full minute, perhaps back. After a drive, this does harm, so the driver
+    waits for the end of a minute.
     """
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 

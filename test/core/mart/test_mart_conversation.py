@@ -105,9 +105,9 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """An ok that comes 0.3 s after a check of the IMU is a late reply, and does not prove the IMU.
+    """An ok that comes 0.3 s after a check of the IMU does not prove that the IMU works.
 
-    A check takes at least 0.32 s.
+    A check takes at least 0.32 s, so this ok is a late reply.
     """
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
@@ -133,8 +133,8 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     """After a missing reply to a sonar query, the next sonar query waits: the reply may still come.
 
-    ENC (encoder query) is sent at once. The reply to ENC is regarded as doubtful, because it may be
-    the missing reply.
+    ENC (encoder query) is sent at once. The reply to ENC is regarded as doubtful, because a late
+    sonar reply would look the same.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)

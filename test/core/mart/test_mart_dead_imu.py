@@ -68,8 +68,9 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 ) -> None:
     """If the IMU dies in a motion, the driver stops the robot and refuses further motion.
 
-    After a restart of the server with a working IMU, motion is allowed again. The server variant
-    "source" reports headings only in forward drives, so it is tested only with these.
+    After a restart of the server with a working IMU, motion is allowed again. The simulated server
+    "source" reports headings only in forward drives, so "source" is tested only with a forward
+    drive.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)

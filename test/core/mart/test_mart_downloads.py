@@ -139,7 +139,7 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 
 
 def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() -> None:
-    """The server falls silent just before the driver sends EXIT, the command that ends the server.
+    """To download the log, the driver sends EXIT, which ends the server. But the server is silent.
 
     The result tells the user to copy the file from the controller. It does not say "call again",
     because another call cannot help.
@@ -161,7 +161,7 @@ def test_a_download_of_the_log_without_a_reply_does_not_ask_for_another_one() ->
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
     """The log can be downloaded after a straight drive, when the heading is often zero.
 
-    A restart of the server also sets the heading to zero, and erases the log.
+    The driver does not take this for the zero of a restarted server, which has no log.
     """
     for seed in range(3):
         bench = MartBench(firmware, seed=seed).ready()
@@ -206,7 +206,7 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The log can still be downloaded after the reply to a stop was lost.
 
-    "No motion" in reply to the repeated stop is not taken for a restart: the heading is not zero.
+    "No motion" in reply to the repeated stop could mean a restart, but the heading is not zero.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
