@@ -47,7 +47,7 @@ class Words:
 
 
 class Stream(CommandPolicy):
-    """A command policy, which decides when set-points are written. Its set-points are bytes."""
+    """A command policy, which decides when to write set-points. The set-points are texts."""
 
     def __init__(self, settings: CommandSettings) -> None:
         proof = StopProof()

@@ -70,8 +70,8 @@ def test_what_is_lost_before_the_first_poses_agree_is_not_taken_back(
 def test_a_damaged_pose_leaves_no_error_when_its_count_makes_the_next_one_look_restarted() -> None:
     """A pose has damaged values and a damaged count. After the next pose, odom has no error.
 
-    The right count of the next pose looks like that of a restarted board, because the count before
-    it was wrong. But this pose lies where the odometry expects it, and removes the error.
+    Because of the damaged count, the next pose seems to come from a restarted board. But the next
+    pose lies where the odometry expects it, and removes the error.
     """
     odometry, trip, estimates = Odometry(SETTINGS), Trip(), []
     for number in range(30):

@@ -63,9 +63,9 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", [0, 3, 5])
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """The board restarts, so SEQ and its pose begin at zero.
+    """The board restarts, so SEQ and its pose begin at zero. Odom continues from its last pose.
 
-    In most cases, some of its frames are lost. Odom continues from its last pose.
+    ``hidden``: the first two bytes of each type of frame that is lost during the restart.
     """
     on = line(seed)
     on.drives = False

@@ -108,7 +108,7 @@ def test_a_silent_board_is_told_once() -> None:
 def test_a_silence_before_the_first_delta_does_not_make_later_stamps_old(came: bytes) -> None:
     """When the board sends again after a silence of 8 s, no stamp is from before the silence.
 
-    The mode is unknown, because only three IMU frames came before the silence.
+    The silence begins after three IMU frames, before the driver knows the board's mode.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

@@ -23,8 +23,8 @@ def bench() -> Bench:
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
     """The user requests a pause. The driver sends Stop, waits for new data, and sends P once.
 
-    The new data shows that the board still runs: P would resume a paused board. The «Paused» text
-    of the board confirms the pause.
+    P would resume a paused board, so the new data must show first that the board runs. The board's
+    «Paused» text confirms the pause.
     """
     bench.drive(0.5)
     bench.run(0.3)

@@ -87,8 +87,7 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
     """The port is lost before the driver has written a requested reset. The reset is never written.
 
-    For a reset, the driver would write Stop and R. When the port is open again, the driver writes
-    only Stop, as after each opening, and S.
+    When the port is open again, the driver writes Stop and S (start), but not R (reboot).
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)

@@ -97,8 +97,8 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide(
 def test_a_short_loss_before_a_hidden_restart_changes_nothing() -> None:
     """A single lost displacement before a gap does not hide a restart in the gap.
 
-    A pose at the new origin shows the restart. The odometry checks the longest gap since the last
-    pose, not the first one.
+    A pose at the new origin shows the restart. The odometry looks for a restart in the longest gap
+    since the last pose, not in the first gap (the single loss).
     """
     odometry, estimates = driven(75, 0.016)
     estimates += odometry.displace(replace(earth(0.016, 0.0), lost=1), 76 * PERIOD_S)
@@ -115,9 +115,10 @@ def test_a_pose_at_a_new_origin_shows_a_restart_that_the_counters_hide_in_a_shor
 ) -> None:
     """The robot drives 1.2 m. After a gap of 0.6 s, the board's pose is at the origin.
 
-    If the counters of the board fit a restart (``ambiguous``), this pose shows a restart: odom adds
-    only the assumed motion in the gap. If the counters exclude a restart, the robot has driven back
-    to the origin, and odom moves there.
+    * ``ambiguous`` is True: the counters allow a restart, so the pose shows a restart. Odom adds
+      only the assumed motion in the gap.
+    * ``ambiguous`` is False: the counters exclude a restart, so the robot has driven back. Odom
+      moves to the origin.
 
     Regression: after a restart, odom moved back to the start of the drive if the robot could have
     driven there.
@@ -242,10 +243,10 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_a_reset_after_a_gap_leaves_no_wrong_heading(
     lost: int, use_board_pose: bool, frame: str
 ) -> None:
-    """A robot ends a turn in a gap. After the gap, the odometry is reset, and odom has no error.
+    """A robot ends a turn in a gap. After the gap, the odometry is reset.
 
     The odometry does not know the robot's heading in the board's frame until the next poses show
-    it.
+    it. After these poses, odom has no error.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=use_board_pose)), Trip(0.7)
     attach(odometry, trip.pose)

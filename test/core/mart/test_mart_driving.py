@@ -156,7 +156,7 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 
 def test_diagnostics_have_the_rate_of_odom() -> None:
-    """The topic /diagnostics contains the user's rate of ``odom``, for the report tool."""
+    """The topic /diagnostics has the rate of ``odom`` that the user set, for the report tool."""
     assert MartBench(settings=MartSettings(odom_rate_hz=10.0)).board.figures.odom_hz == 10.0
 
 

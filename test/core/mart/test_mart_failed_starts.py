@@ -78,7 +78,8 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
     """If a server rejects RM (forward drive) but the robot moves, the motors are switched off.
 
-    The server obeys no stop. The driver then refuses motion.
+    The server ignores stop commands, so the driver switches the motors off, and then refuses
+    motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)

@@ -141,9 +141,8 @@ def test_a_turn_that_is_begun_anew_has_other_units(
 ) -> None:
     """A turn with a wrong rate is started again with other motor units.
 
-    This also holds if the driver does not get the angle of the first turn, because a heavy robot
-    stops too slowly, or because the reply to the stop is late. Without the angle, the encoder shows
-    the motors' speed.
+    The driver does not get the angle of the first turn, because a heavy robot stops too slowly, or
+    because the reply to the stop is late. So the driver takes the motors' speed from the encoder.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

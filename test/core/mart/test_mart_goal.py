@@ -112,10 +112,10 @@ def test_a_goal_that_is_not_reached_is_given_up_with_a_notice() -> None:
 
 
 def test_a_straight_move_that_is_too_long_for_the_server_does_not_use_up_the_moves() -> None:
-    """The driver stops a straight move after 80 s (about 20 m), and counts moves from zero again.
+    """A straight move is stopped after 80 s (about 20 m), but the robot reaches a goal at 30 m.
 
-    The driver gives up a goal after a certain number of moves. With the new count, the robot can
-    reach a goal that is far away.
+    The driver gives up a goal after a certain number of moves. The stop at 80 s sets the count of
+    moves to zero, so the robot can reach goals that are far away.
     """
     bench = MartBench().ready()
     bench.go_to(30.0, 0.0, 0.0)

@@ -49,10 +49,10 @@ def test_a_goal_comes_to_an_end_although_a_quarter_of_all_datagrams_is_lost(seed
 
 
 def test_a_goal_that_another_cause_ends_is_noticed() -> None:
-    """The e-stop ends a goal, and the tests' function ``reach`` notices the end within 30 s.
+    """The tests' function ``reach`` waits for the end of a goal. It notices an end by the e-stop.
 
-    ``reach`` waits for the end of a goal. The driver does not report "over" after an e-stop, so
-    ``reach`` also asks whether the session has dropped the goal.
+    After an e-stop, the driver does not report that the goal is over, so ``reach`` also asks
+    whether the session has dropped the goal. ``reach`` returns within 30 s.
 
     Regression: the driver ended a goal because the robot was pushed. ``reach`` did not notice this,
     and a measurement of many goals was aborted.
@@ -203,9 +203,9 @@ def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_
 def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
     """The first move of a robot goes only half as far as requested, and the odometry stays right.
 
-    The network loses the driver's queries after the move, so the driver sends a stop against a
-    possible second run. Half a distance could mean that this stop has ended a second run. But the
-    driver has not learned yet how far this robot drives, so it assumes that there was only one run.
+    The network loses the driver's queries after the move, so the driver sends a stop in case a copy
+    of the move has started a second run. The driver has not learned yet how far this robot drives,
+    so it assumes that there was only one run.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -284,7 +284,7 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
-    """A suspected copy of a turn does not end the goal if the encoder shows one complete turn."""
+    """A suspected copy of a turn does not end the goal if the encoder count fits a single run."""
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot
 
@@ -356,9 +356,10 @@ def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
 def test_a_second_run_whose_first_reply_is_lost_makes_the_odometry_uncertain(
     goal: Pose, cut_s: float
 ) -> None:
-    """If the reply to the first run of a duplicated move is lost, the covariance includes this run.
+    """A move is duplicated, and its first reply is lost. The covariance fits the error.
 
-    The encoder counts only the second run, which ends by itself or is stopped.
+    The move runs twice, but the encoder counts only the second run, so the first run is missing in
+    the odometry. The second run ends by itself or is stopped.
     """
     bench = MartBench("source").ready()
     to_board, from_board = bench.robot.receive, bench.robot.advance

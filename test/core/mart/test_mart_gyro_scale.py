@@ -59,9 +59,10 @@ def test_a_scale_corrects_all_turns_that_the_gyro_measures(firmware: Firmware) -
 def test_a_gyro_that_measures_half_of_each_turn_makes_no_turn_seem_late() -> None:
     """The gyro measures half of each turn. After a turn to a goal, the heading is still certain.
 
-    The driver requests half of the true angle, but expects a duration that fits the true angle.
-    Regression: the driver expected a duration that fits the requested angle. Each turn to a goal
-    seemed to last long enough for two turns, so the heading was uncertain by more than 2 rad.
+    The server ends a turn by its gyro, so the driver requests half of the true angle. The driver
+    computes the duration of the turn from the true angle. Regression: the driver computed the
+    duration from the requested angle, so each turn to a goal seemed to last long enough for two
+    turns, and the heading was uncertain by more than 2 rad.
     """
     bench = bench_with_poor_gyro("firmware", 0.5)
     here = bench.odometry[-1].pose

@@ -107,9 +107,9 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
     """The network duplicates the server's replies "not supported". The driver ignores the copies.
 
-    A server that follows the manual gives this reply to SSP (speed of turns) and to RST IMU (check
-    of the IMU). The driver does not take a copy for the reply to its next check of the IMU, and the
-    robot turns.
+    A server that follows the manual does not support SSP (speed of turns) and RST IMU (check of the
+    IMU), so the driver checks the IMU by another command. The driver does not take a copy for the
+    reply to this command, and the robot turns.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -150,8 +150,8 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
     The server needs 0.3 s to stop a second run, so a reply after 0.28 s shows that there was no
     second run.
 
-    ``copied``: whether the network duplicates the move. If it does, the robot makes two runs, and
-    the driver adds the first run to the odometry.
+    ``copied``: whether the network does duplicate the move. If it does, the driver reports this,
+    and the odometry contains both runs.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""
@@ -174,8 +174,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     """A late reply to a start is not taken for the reply to the stop after it.
 
-    The driver checks the IMU before it sends the start. A copy of the reply to this check seems to
-    confirm the start. Then the stop is lost, and the true reply to the start arrives.
+    The driver checks the IMU, and sends the start. A copy of the reply to the check arrives, and
+    looks like the reply to the start. The driver sends a stop, which is lost. Then the late reply
+    to the start arrives.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]
@@ -326,7 +327,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
     """A late ok to an IMU check does not confirm a backward drive whose command was lost.
 
-    The driver does not trust the ok, because the network has just duplicated replies.
+    The network has just duplicated replies, so the driver regards the ok as a possible copy.
     """
     bench = MartBench(firmware).ready()
     bench.command(-0.2, 0.0, 3.0)

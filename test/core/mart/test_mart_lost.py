@@ -132,8 +132,8 @@ def test_a_reopened_port_does_not_end_the_refusal_of_a_server_whose_stop_port_ha
 def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
     """The server's process stands still for 5 s while the robot is at rest, and then works again.
 
-    The server answers old queries late. The driver accepts commands again, because only late
-    replies to stops would show that the stop port may hang.
+    The server answers old queries late. Late replies to queries do not mean that the stop port
+    hangs, so the driver accepts commands again.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.3, 2.0)

@@ -33,9 +33,8 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Return a test bench after two motions that end with equal encoder counts.
 
-    In each motion, the network loses all replies from the start of the motion until ``quiet_s``
-    seconds after the driver begins to stop the robot. After each motion, this function checks the
-    covariance.
+    The network loses all replies during each motion, and for ``quiet_s`` seconds after the driver
+    begins to stop the robot. After each motion, this function checks the covariance.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -178,7 +177,7 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """If a second motion ends with the same count as the first, the covariance covers two cases.
+    """If two motions end with the same encoder count, the covariance covers two cases.
 
     Either the start of the second motion was lost, or the second motion was equal to the first.
     """

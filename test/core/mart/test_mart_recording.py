@@ -13,10 +13,10 @@ from omnibot_driver.core.errors import ParameterError
 
 @pytest.mark.parametrize("port", ["replay://field", "REPLAY://field?speed=10"])
 def test_a_recording_is_refused_with_what_to_do_instead(port: str) -> None:
-    """A recording is refused as the port of a MART controller.
+    """A recording is rejected as the parameter ``port`` of a MART controller.
 
-    A replay does not repeat the driver's requests, on which the odometry depends. The message names
-    two other uses of the bag.
+    A replay does not repeat the driver's requests, on which the odometry depends. The error message
+    names two other uses of the recording.
     """
     with pytest.raises(ParameterError) as refusal:
         boards.check_all({"board": "mart", "port": port})

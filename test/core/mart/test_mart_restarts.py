@@ -227,8 +227,8 @@ def test_a_restart_between_two_stop_commands_of_a_turn_does_not_lead_to_voltage_
 ) -> None:
     """The driver stops the first turn of a server. The server answers a stop (SM), and restarts.
 
-    The driver needs three stop commands, so it assumes that the server may have restarted. It
-    delays the voltage query (VOLTS), which would crash a server that is starting up.
+    The driver must send three stop commands. A restart may be the cause, so the driver delays the
+    voltage query (VOLTS), which would crash a server that is starting up.
     """
     bench = MartBench("source").ready()
     bench.command_until(0.0, 0.5, lambda: not bench.robot.stands, 8.0)
@@ -308,11 +308,11 @@ def test_a_short_restart_while_the_imu_is_checked_is_noticed(
 
 @pytest.mark.parametrize("seed", [2, 6, 14])
 def test_motors_that_run_on_are_switched_off_without_mcs_on_a_bad_network(seed: int) -> None:
-    """A server without MCS (direct control) is restarted in a drive, and the motors run on.
+    """A server without the command MCS is restarted in a drive, and the motors run on.
 
-    The driver sends a turn of 1 degree, which ends with the motors off. The network is bad, so the
-    encoder counts that show the motion may come long after the driver's first stops. The robot is
-    at rest within 8.5 s.
+    Without MCS (direct control), the driver sends a turn of 1 degree, which ends with the motors
+    off. The network is bad, so the encoder counts that show the motion may come long after the
+    driver's first stops. The robot is at rest within 8.5 s.
     """
     network = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.02)
     bench = MartBench("documented", network, seed=seed).ready()

@@ -145,8 +145,9 @@ class Desk:
 def compared(server: Server) -> Server:
     """Return the state of the server, with fixed values for what the test cannot compare.
 
-    If the command port waits for the IMU or hangs, the test can see neither which of the two is
-    true, nor the motion, nor whether the stop port has stopped a motion (``released``).
+    The test cannot tell a command port that waits for the IMU from a command port that hangs. In
+    both cases, the motion is unknown, and so is ``released`` (whether the stop port has stopped a
+    motion).
     """
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)

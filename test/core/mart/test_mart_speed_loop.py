@@ -167,7 +167,7 @@ def test_unanswered_changes_are_judged_by_the_measured_speeds(
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
     """The driver assumes at most 8 % difference between the motors, even if it measures more.
 
-    The motors may be equal: if the network duplicates a change of speed, they look unequal.
+    If the network duplicates a change of speed, equal motors look unequal.
     """
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)

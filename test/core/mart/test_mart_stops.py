@@ -218,9 +218,9 @@ def test_a_lost_reply_does_not_make_a_stop_look_like_a_restart(number: int) -> N
     """A lost reply to a query does not make the driver suspect a restart of the server.
 
     The network loses one to three replies to queries. Later, the user starts a drive, and stops it
-    as soon as the wheels turn. The server answers the start and the stop with ``ok``, and a second
-    stop with "no motion". The two ``ok`` replies show the driver that the first stop has ended the
-    drive, so the driver does not switch the motors off by MCS.
+    as soon as the wheels turn. The server answers the start and the first stop with ``ok``, and a
+    second stop with "no motion". The driver concludes that the first stop has ended the drive, and
+    does not switch the motors off by MCS.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 1.0)

@@ -59,10 +59,10 @@ class Drive:
         return Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau))
 
     def run(self, seconds: float) -> None:
-        """Drive curves for ``seconds``. Record the errors of odom after a bit has been changed.
+        """Drive curves for ``seconds``. Record odom's errors once a bit of a frame has changed.
 
-        The method ``arm`` changes one bit of a frame. ``last`` is the newest error. ``worst_m`` and
-        ``worst_rad`` are the largest errors.
+        The attribute ``last`` is the newest error. ``worst_m`` and ``worst_rad`` are the largest
+        errors.
         """
         for _ in range(round(seconds / TICK_S)):
             t, before = self.bench.now, len(self.bench.events)

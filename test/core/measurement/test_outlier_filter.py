@@ -41,7 +41,10 @@ def gate() -> OutlierFilter:
 
 
 def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
-    """Pass the readings to the filter. For each reading, return a list of what it releases."""
+    """Pass the readings to the filter.
+
+    For each reading, return a list of the readings that the filter releases.
+    """
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
         for number, reading in enumerate(readings)
@@ -181,8 +184,8 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement faster than 2 m/s or 8 rad/s is rejected, and counts as lost.
 
-    The next displacement then reports four losses: the rejected displacement, two losses that the
-    rejected displacement has reported, and one loss of its own.
+    The rejected displacement reports two losses, and the next displacement reports one. The filter
+    adds the rejected displacement itself, so the next displacement comes out with four losses.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -203,7 +206,7 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
     """A single displacement jumps from 0.25 m/s to 1.5 m/s, and is rejected.
 
-    A pose follows. The filter holds the pose until the next displacement shows that the jump is
+    A pose follows. The filter releases the pose when the next displacement shows that the jump is
     over.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
@@ -331,10 +334,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A knock comes out of the filter at once if the full scale is infinite, as for a text sensor.
+    """The filter releases the reading of a knock at once if the sensor sends text.
 
-    The filter does not suspect a flipped bit, because damage to a text does not flip a single bit
-    of a value.
+    Damage to a text does not flip a single bit of a value. So a text sensor has an infinite full
+    scale, and the filter does not suspect a flipped bit.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]

@@ -99,8 +99,8 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 ) -> None:
     """A robot is commanded to drive forward, and begins to move backward within a displacement.
 
-    The displacement lasts 0.1 s and can be near zero, but the monitor does not take the robot for a
-    held robot: the driver sends Stop within 0.3 s.
+    In this displacement of 0.1 s, the forward and backward motion can cancel each other, as if the
+    robot were held. Nevertheless, the driver sends Stop within 0.3 s.
     """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
@@ -117,10 +117,10 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """A board takes each velocity for a goal. The driver stops the robot within 0.3 s and 5 cm.
+    """A board's switch is on position control. The driver stops the robot within 0.3 s and 5 cm.
 
-    The board's switch is on position control. Each of these goals lies behind the robot, so the
-    robot moves in the wrong direction.
+    The board takes each velocity for a goal. These goals lie behind the robot, so the robot moves
+    in the wrong direction.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m

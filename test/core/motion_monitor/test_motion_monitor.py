@@ -177,7 +177,7 @@ def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
 
 
 def test_two_senders_in_turn_do_not_trip() -> None:
-    """Two senders command motion and rest in turn. The robot moves at a speed in between.
+    """One sender commands 0.4 m/s, and another sender commands rest. The robot moves at 0.2 m/s.
 
     The monitor finds no fault.
     """

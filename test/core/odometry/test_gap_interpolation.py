@@ -205,9 +205,9 @@ def test_a_drive_in_an_unknown_direction_ends_anywhere_within_its_length() -> No
 
 
 def test_a_way_back_in_another_unknown_direction_does_not_lead_back() -> None:
-    """The board restarts, so that its direction is unknown, and the robot drives 2 m.
+    """The board restarts twice, and each time the heading becomes unknown and the robot drives 2 m.
 
-    The board restarts again, and odom shows a drive back to the start. The true directions differ,
+    Odom shows a drive away from the start and back. The true headings of the two drives may differ,
     so x is uncertain by more than 1 m.
 
     Regression: the errors of both drives cancelled each other, and x was uncertain by 0.1 m.
@@ -246,8 +246,8 @@ def test_a_loss_that_a_pose_showed_is_bridged_if_the_board_did_not_restart() -> 
     """The odometry estimates lost motion if poses disprove a suspected restart of the board.
 
     A displacement seems to show a restart. Two later displacements are lost, and then two poses
-    disprove the restart. ``use_board_pose`` is False, so the odometry does not take the lost motion
-    from the poses. The odometry continues the last motion.
+    disprove the restart. ``use_board_pose`` is False, so the odometry estimates the lost motion
+    from the last motion, not from the poses.
     """
     odometry, trip = Odometry(replace(SETTINGS, use_board_pose=False)), Trip()
     attach(odometry, trip.pose)

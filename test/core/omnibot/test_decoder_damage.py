@@ -164,7 +164,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
 def test_rubbish_between_frames_costs_a_few_frames_only(
     pieces: list[Frame | bytes], data: st.DataObject
 ) -> None:
-    """The decoder gets any frames and noise, then six normal frames. It returns the next frame."""
+    """The decoder gets frames and noise, then seven normal frames. It returns the seventh."""
     stream = b"".join(piece if isinstance(piece, bytes) else encode(piece) for piece in pieces)
     made = FrameDecoder()
     for chunk in data.draw(chunkings(stream)):

@@ -260,10 +260,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 @pytest.mark.parametrize("running", [True, False])
 @pytest.mark.slow
 def test_a_board_in_imu_only_mode_is_recognized(period_s: float, running: bool) -> None:
-    """The driver recognizes IMU-only mode, also if the board is paused at first.
-
-    It sends the start (S) every 0.5 s, because it has not seen the board running.
-    """
+    """The driver recognizes IMU-only mode, also if the board is paused at first."""
     bench = Bench(BoardSettings(imu_only=True, running=running, delta_period_s=period_s))
     bench.open()
     bench.run_until_state("imu_only", 4.0)

@@ -70,7 +70,7 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """After 30 IMU frames without another frame, only IMU frames can have been lost.
+    """After 30 IMU frames in a row, only IMU frames can have been lost.
 
     So the schedule counts all damaged bytes as lost IMU frames.
     """

@@ -45,8 +45,7 @@ def stopped(
 
     ``most``: largest number of bytes in a read.
 
-    ``piece``: after the reader has read all bytes that have arrived, it waits for this number of
-    new bytes.
+    ``piece``: number of bytes for which the reader waits when no unread bytes are left.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -80,8 +79,7 @@ def heard(reads: Iterable[Read], begun: FrameDecoder | None = None) -> list[Fram
 def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
     """Decode the reads of several readers separately, and return a list of frames for each reader.
 
-    A reader takes the bytes of the line in reads. As long as the reads of all readers are the same,
-    they are decoded only once.
+    Reads at the beginning that are equal for all readers are decoded only once.
     """
     lists = [list(reads) for reads in readers]
     made, found, common = FrameDecoder(), [], 0

@@ -157,7 +157,7 @@ def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
 def test_an_illegal_request_raises_and_changes_nothing(
     happenings: list[Happening | Frame],
 ) -> None:
-    """A tracker refuses a request.
+    """A mode tracker refuses a request.
 
     Then it continues exactly like a tracker that never got the request.
     """

@@ -92,10 +92,10 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
 ) -> None:
     """A pose after a gap is ambiguous even if a pause or a reconnection precedes the pose.
 
-    The board restarts in a gap of 2.1 s, but the counters also fit a mere loss of frames. Before
-    the first pose after the gap, the board is paused, or the port is opened again. The pose refers
-    to the board's new origin. If the driver supposed the old origin, ``odom`` would jump to the
-    place where the board first started.
+    After a gap of 2.1 s, the counters fit a restart of the board, but also a loss of frames. Before
+    the next pose, the board is paused, or the port is opened again. If the board has restarted, the
+    pose refers to a new origin. If the driver then supposed the old origin, ``odom`` would jump to
+    the place where the board first started.
     """
     sequence = counted(1228)
     begun_s = 1228 * 0.04 + 2.1
@@ -111,15 +111,13 @@ def test_a_pause_or_a_reconnection_before_the_pose_leaves_it_ambiguous(
 def test_a_restart_also_shows_if_the_deltas_have_wrapped_in_the_gap_after_it(
     uptime: int, restarted: bool
 ) -> None:
-    """The board restarts in a gap, and by chance the delta counter looks as if it had continued.
+    """The board restarts in a gap, and by chance the delta counter seems to have continued.
 
-    The board sends ``uptime`` deltas. A gap of 12.4 s follows, in which the board restarts and
-    sends 270 deltas. The expected result depends on ``uptime``:
+    ``uptime``: number of deltas before the gap. In the gap of 12.4 s, the board restarts and sends
+    270 deltas. The result depends on ``uptime``:
 
-    * ``uptime`` is 217: the pose counter does not look as if it had continued, so the next pose
-      shows the restart.
-    * ``uptime`` is 1241: the pose counter also looks as if it had continued, so the next pose is
-      ambiguous.
+    * 217: the pose counter does not seem to have continued, so the next pose shows the restart.
+    * 1241: the pose counter also seems to have continued, so the next pose is ambiguous.
     """
     sequence = counted(uptime)
     for count in range(270, 275):
@@ -156,9 +154,9 @@ def test_the_pose_after_a_restart_of_the_delta_counter_shows_it_too_if_it_also_b
 ) -> None:
     """A delta seems to show a restart. A pose confirms the restart if the pose counter is near 0.
 
-    In two other cases, the pose does not show the restart:
+    In two other cases, the pose does not confirm the restart:
 
-    * The pose counter continues its old count. The counter of the delta may be damaged.
+    * The pose counter continues its old count, so the counter of the delta may be damaged.
     * The pose counter is not near 0, and does not continue its old count.
     """
     sequence = counted(200)
@@ -184,9 +182,9 @@ def test_the_first_pose_after_a_gap_in_which_its_counter_wraps_shows_no_restart(
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """The board restarts. By chance, its count 0 also fits the last count and the elapsed time.
+    """The board's delta counter restarts at 0. By chance, 0 also continues the old count.
 
-    The counter of the next pose is also 0. This shows the restart.
+    The counter of the next pose is also 0, which shows the restart.
     """
     sequence = counted(206)
     after_s = 205 * 0.04 + 2.0
@@ -275,8 +273,8 @@ def test_a_pose_that_comes_first_after_a_reconnection_is_not_counted_against_ear
 ):
     """A reconnection whose first frame is a pose does not make the driver suspect a restart.
 
-    Deltas were lost before this pose. The driver ignores the counter of the pose, and the next
-    delta shows the losses.
+    Deltas were lost before this pose, so the pose counter does not fit the received deltas. The
+    driver ignores this pose counter, because the next delta shows the losses.
     """
     sequence, restarts = Sequence(), []
     for count in [*range(25), *range(49, 75)]:
@@ -314,8 +312,9 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
     """A pose shows that a delta is lost. The next delta does not count this loss again.
 
-    This delta arrives only 20 ms after the pose, which is too early for its counter. But the pose
-    has explained the counter, so the driver does not take the counter for a damaged one.
+    This delta arrives only 20 ms after the pose, although its counter has advanced by two periods
+    (80 ms). The pose has explained the counter, so the driver does not take the counter for a
+    damaged one.
     """
     sequence = Sequence()
     for count in range(11):

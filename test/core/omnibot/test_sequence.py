@@ -83,9 +83,8 @@ def test_without_poses_only_a_low_count_after_a_pause_is_that_of_a_restarted_boa
 ) -> None:
     """If a board sends no poses, only a low count after a pause makes the driver suspect a restart.
 
-    The count shows two numbers of lost deltas: one for a board that has restarted, and one for a
-    board that has continued. The count is low if the first number is not the larger one. No pose
-    can disprove the suspicion later.
+    A count is low if a restart would mean no more lost deltas than a continued count. Without
+    poses, nothing can disprove the suspicion later.
     """
     sequence = begun(count)
     sequence.pause()
@@ -113,8 +112,7 @@ def test_a_restart_after_a_pause_is_doubtful_if_a_board_that_continued_lost_fewe
 ) -> None:
     """After a pause, the driver assumes a restart if the first delta does not continue the count.
 
-    The restart is doubtful if a board that continued would have lost fewer deltas than a restarted
-    board.
+    The restart is doubtful if it would mean more lost deltas than a continued count.
     """
     sequence = begun(before - 10)
     for number in range(11):
@@ -155,9 +153,9 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """The board's clock is 1 % fast, so 3030 instead of 3000 periods pass in 120 s.
+    """The board's clock is 1 % fast. After a gap of 120 s, the 3029 lost deltas are counted.
 
-    The 3029 lost deltas are counted correctly.
+    In 120 s, the board sends 3030 deltas instead of 3000.
     """
     sequence = Sequence()
     sequence.delta(100, 0.0)
@@ -179,9 +177,9 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnection to another board, the result is the same as after a restart.
+    """After a reconnection to another board, the driver assumes a restart.
 
-    The next count can be any number, even one that is too high for a restarted board.
+    It does so even if the next count is too high for a board that has just restarted.
     """
     sequence = begun(7)
     sequence.reconnect()
