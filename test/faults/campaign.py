@@ -39,7 +39,7 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Number of drivers for each group of stops in ``LIVES``, on a line that loses bytes."""
+"""Number of drivers that perform each group of stops in ``LIVES``, on a line that loses bytes."""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -207,8 +207,7 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test how the robot stops if the line loses bytes on the way to the board.
 
-        ``number_of_life``: index in ``LIVES``. It selects the group of stops that each driver
-        carries out.
+        ``number_of_life``: index in ``LIVES`` of the stops that each driver performs.
 
         ``numbers``: one number for each driver, which selects the lost bytes.
         """

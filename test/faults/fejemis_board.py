@@ -17,7 +17,7 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.fejemis import CHANNELS, FejemisSettings, SimulatedFejemis
 
 TICKS: Final = 5
-"""Number of ticks of the simulated boards in one tick of the campaign."""
+"""Number of ticks of the simulated boards in one tick of the fault campaign."""
 SILENCE_S: Final = 1.6
 ANGLE_S: Final = 0.2
 MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.MULTILINE)
@@ -26,8 +26,8 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both simulated Teensys, with the interface of a single board.
 
-    ``tick``: number of the campaign's ticks so far. One tick of the campaign is ``TICKS`` ticks of
-    the boards.
+    ``tick``: number of ticks of the fault campaign so far. One such tick is ``TICKS`` ticks of the
+    boards.
 
     ``received``: motion commands to the drive board, without checksums and padding.
     """

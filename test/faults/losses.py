@@ -83,5 +83,5 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""Groups of stops. One driver performs all stops of a group. The last stop of each group also ends
-the driver."""
+"""Ways to stop the robot, in groups. One driver performs all stops of a group, one after the other.
+The last stop of each group also ends the driver."""

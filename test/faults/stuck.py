@@ -110,7 +110,7 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 
 
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
-    """Let the server hold back the driver's data for 3 s, then deliver all of it at once.
+    """Let the serial-port server hold the driver's data for 3 s, then deliver all of it at once.
 
     ``mute``: whether the server also holds back the board's data.
     """

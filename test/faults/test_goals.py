@@ -47,7 +47,10 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_are_pursued_by_what_was_sent(goals: GoalRig) -> None:
-    """During the earlier tests of this module, the driver published only what the board sent."""
+    """The tests of this module share one driver.
+
+    Up to here, the driver has published only readings that the board sent.
+    """
     goals.judge_stream()
     assert not goals.findings.take(), goals.driver.output
     assert goals.findings.published > 50
