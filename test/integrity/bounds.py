@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The limits for a parser's errors, and the streams on which the report checks these limits.
+"""Limits for a parser's errors, and the streams on which the integrity report checks these limits.
 
 A *chunking* is a way to read a stream in pieces. The *plain* parser, for comparison, decodes
 without checks.
@@ -51,8 +51,8 @@ class Bound:
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded with this chunking.
 
-        For a chunking in ``BUSY_LOOPS``, a higher share is reduced to 99.9 %, because both the
-        adapter and the reader are late.
+        For a chunking in ``BUSY_LOOPS``, the share is at most 0.999, because both the adapter and
+        the reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
@@ -87,8 +87,7 @@ BOUNDS: dict[str, Bound] = dict(
 )
 """The limits for each fault.
 
-For the fault in which bytes are added to the stream, there are limits only for chunkings that
-deliver several frames at once.
+The fault that adds bytes to the stream has limits only for the three chunkings with long chunks.
 """
 
 Scores = dict[tuple[str, str, str], Score]

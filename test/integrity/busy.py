@@ -25,7 +25,7 @@ JITTER_S = 60e-6
 READ_S = 20e-6
 """Duration of a read that does not wait for data, in s."""
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
-"""Share of the wake-ups that busy loops delay, and the range of the delay in s."""
+"""Share of the wake-ups that are late because of busy loops, and the range of their delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
 """How often and how long busy loops slow the process down.
 

@@ -16,15 +16,13 @@ MOST_DROPPED = 30
 """Largest number of intact true frames that the judge skips without further evidence.
 
 The judge skips true frames until one equals the decoded frame. After a larger skip, the two frames
-may be equal by chance. So the judge continues from there, and searches for the next decoded frame
-of the same read. If this second search also skips more than ``MOST_DROPPED`` frames, the judge
-counts the decoded frame of the first search as wrong.
+may be equal by chance. So the judge then searches for the next decoded frame of the same read. If
+the judge again skips more than ``MOST_DROPPED`` frames, it counts the first decoded frame as wrong.
 """
 REACH_BYTES = 600
-"""Number of received bytes by which the judge goes back from the start of a read.
+"""How far before a read the judge begins to search for the frames of the read, in received bytes.
 
-From the corresponding byte of the sent stream, the judge goes back another 300 bytes. There, the
-search for the frames of the read begins.
+The judge goes back by another 300 bytes of the sent stream.
 """
 
 
@@ -40,7 +38,10 @@ class Score:
     """Number of texts among the intact frames."""
     texts_delivered: int = 0
     missed_beyond_two: int = 0
-    """Number of streams in which an intact frame is missing after the first two intact frames."""
+    """Number of streams in which the parser missed an intact frame other than the first two.
+
+    If a stream starts within a frame, the first two may be lost.
+    """
 
     @property
     def wrong_share(self) -> float:

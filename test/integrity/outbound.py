@@ -46,8 +46,8 @@ class Bound:
     ``long_in``: the number N in "at most one uncommanded set-point of over 2 ms in N control
     frames".
 
-    ``overdue``: whether two cases are errors: the robot still drives when it must be at rest, and
-    the robot still drives at the end of the trial.
+    ``overdue``: whether it is an error that the robot still drives when it must be at rest, or at
+    the end of the trial.
     """
 
     share: float = 1.0
@@ -96,7 +96,7 @@ def share(score: Score) -> str:
 
 
 def table(scores: Scores) -> tuple[list[str], bool]:
-    """Return the rows of the tables, and whether every bound holds on every receiver."""
+    """Return the lines of the tables, and whether the errors of all receivers are within limits."""
     lines = [
         "| loss | receiver | trials with stray motion | still driving | uncommanded, of the time "
         "| longer than 2 ms, of the frames | longest | false letters | |",

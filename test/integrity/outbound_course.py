@@ -22,14 +22,14 @@ class Understood:
 
     ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the next special write; the number of writes if
-    there is none.
+    ``alike_until``: for each write, the index of the next write that is unlike it, or the number of
+    writes if there is none.
 
-    A write is special in three cases:
+    A write is unlike the writes before it in three cases:
 
     * It begins or ends a motion.
-    * The line is still sending an earlier write.
-    * The receiver understands other commands than the control frames in the write.
+    * It waits until the line has sent an earlier write.
+    * The receiver understands something different from the control frames in the write.
     """
 
     held: list[bytes]
@@ -37,7 +37,7 @@ class Understood:
 
 
 class Course:
-    """The driver's writes in a scene while the board shows the states in ``history``."""
+    """The driver's writes in a scene in which the board reports the states in ``history``."""
 
     def __init__(self, scene: Scene, history: History | None = None) -> None:
         self.scene = scene
@@ -69,9 +69,9 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """Total number of runs of the driver's session, with one run for each course.
+        """Number of runs of the driver's session: one for this course and one for each variant.
 
-        The total includes this course, and all courses that ``when`` has derived from this course.
+        The method ``when`` makes the variants.
         """
         return 1 + sum(other.rehearsals for other in self._others.values())
 

@@ -91,7 +91,7 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether no stray and no uncommanded set-point is active."""
+        """Whether the board obeys neither a stray motion frame nor an uncommanded set-point."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":

@@ -26,8 +26,8 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes before the next fault. For a write of at most this length, the caller
-    may subtract the length from ``whole`` instead of calling ``carry``.
+    ``whole``: number of bytes before the next fault. For a write of at most ``whole`` bytes, the
+    caller may subtract the write's length from ``whole`` instead of calling ``carry``.
     """
 
     whole: int

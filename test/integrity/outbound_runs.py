@@ -25,10 +25,10 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. The commands differ from script to script."""
 NEEDED: Final = 10_000
-"""Minimum number of trials in scenes that end a drive, for each receiver and rate of lost bytes.
+"""Minimum number of trials of all scenes in ``ENDED``, for each receiver and rate of lost bytes.
 
-These scenes (``ENDED``) share the trials equally. One exception: with 1 byte in 100 lost, each
-scene in ``HURRIES`` alone has ``NEEDED`` trials.
+The scenes share the trials equally. One exception: with 1 byte in 100 lost, there are ``NEEDED``
+trials of each scene in ``HURRIES``.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -81,7 +81,7 @@ def trials(fault: str, scene: str) -> int:
 def one(
     share: float, job: tuple[str, int], faults: Mapping[str, Fault] = FAULTS
 ) -> tuple[Scores, int]:
-    """Run one script of a scene with each fault on all boards.
+    """Run one script of a scene with each fault and each kind of board.
 
     Return the scores, and the number of runs of the driver's session.
 

@@ -2,7 +2,8 @@
 
 """A minimal simulation of a board's reports, without any code of the driver.
 
-The reported motion follows the commands as sent, so it shows no damage of the line.
+While the robot moves, the reported motion is the commanded one, even if the line damages the
+command.
 """
 
 import math

@@ -14,9 +14,9 @@ from truth import SCENARIOS, generate
 
 SECONDS = 2.5
 SEED = 25
-"""A seed for which the stream contains a pause of the board and a text.
+"""A seed for which the stream contains a pause of the board and a text from the board.
 
-Few seeds have this effect in a stream as short as this one.
+Few seeds give both in a stream as short as this one.
 """
 
 

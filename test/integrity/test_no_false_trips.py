@@ -20,7 +20,10 @@ def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """The motion monitor stops a robot whose wheels turn more than twice as fast as commanded."""
+    """In the rough drive, the wheels of a robot turn more than twice as fast as commanded.
+
+    The motion monitor stops the robot.
+    """
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

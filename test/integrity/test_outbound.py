@@ -39,7 +39,7 @@ class Losing:
 
 
 def on_all_receivers(course: Course, line: Line) -> Score:
-    """Send the writes of ``course`` to each kind of receiver; return the total score.
+    """Send the driver's writes in ``course`` to each kind of receiver. Return the total score.
 
     Each receiver gets its own copy of ``line``, with the same faults.
     """
@@ -141,10 +141,10 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """The judge accepts a letter that the driver sent, and counts other letters.
+    """The judge accepts a letter (S, P or R) that the driver sent. It counts all other letters.
 
-    * A byte of a frame that the board takes for a letter: "false".
-    * A letter that the line added: "added".
+    * A byte of a frame that the board takes for a letter counts as "false".
+    * A letter that the line added counts as "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)

@@ -81,10 +81,10 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 
 
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
-    """Return a part of all combinations of choices: about one combination in ``number``.
+    """Return about one in ``number`` of the combinations that have one choice from each list.
 
-    A combination has one choice from each list. If there are three or more lists, and each list has
-    at least ``number`` choices, then any two choices from different lists occur together.
+    With three or more lists of at least ``number`` choices each, every pair of choices from two
+    different lists occurs.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [
