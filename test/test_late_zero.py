@@ -82,9 +82,9 @@ def source(bench: Any) -> str | None:
 
 
 def on_the_way(monkeypatch: pytest.MonkeyPatch) -> tuple[AnyBench, Topic]:
-    """Return a bench with a MART that drives to a goal, and the topic cmd_vel of its driver.
+    """Return a bench with a MART that drives to a goal, and a topic that delivers cmd_vel messages.
 
-    A zero command arrived on this topic before the goal was commanded.
+    The driver received a zero command on cmd_vel before the goal.
     """
     bench = nominal("mart")
     topic = Topic(bench, monkeypatch)

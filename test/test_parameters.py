@@ -87,7 +87,7 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize(("name", "default"), PROMISED.items())
 def test_every_promised_parameter_is_there_with_its_default(name: str, default: object) -> None:
-    """Every promised parameter has its promised default of the same type: floats stay floats."""
+    """Each parameter that users rely on has the default in ``PROMISED``, of the same type."""
     assert PARAMETERS.by_name[name].default == default
     assert type(PARAMETERS.by_name[name].default) is type(default)
 

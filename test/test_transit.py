@@ -282,11 +282,11 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """The driver finds two possible times at which the second message of a sender was sent.
+    """While the offset of a sender's clock is unknown, the driver returns two sending times.
 
-    * The first time assumes that the sender's first message had no delay. In this test, the first
-      message was 0.5 s late, so this time is 0.5 s too late.
-    * The second time is by the sender's clock. In this test, the sender's clock is right.
+    * By the driver's clock: 0.5 s too late. The driver assumes that the sender's first message
+      had no delay, but it took 0.5 s.
+    * By the sender's clock: right, because the sender's clock is right in this test.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -298,8 +298,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """The sender's clock is an hour behind. After ten messages, the driver knows this difference.
 
-    The driver no longer returns the time by the sender's clock as a possible time of sending. The
-    only possible time is by the driver's clock, and it is right.
+    The driver now returns the time of sending only by its own clock, and this time is right.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

@@ -74,9 +74,9 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """Return how many Python calls ``work`` makes for one tick of a running board, on average.
+    """Return the mean number of Python calls that ``work`` makes for each kind of tick.
 
-    The keys of the result are the numbers of bytes that the board sends in a tick.
+    The key for a kind of tick is the number of bytes that the running board sends in such a tick.
     """
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}

@@ -53,8 +53,9 @@ FAILURES = {
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
     """Build the package into ``lib`` in ``folder``, and return the output of the build.
 
-    ``fails``: Python statement that the substitute for mypyc runs. ``source``: C code that the
-    substitute writes. ``wanted``: value of ``OMNIBOT_DRIVER_COMPILE``.
+    A substitute replaces mypyc. ``fails``: Python statement that the substitute runs first, for
+    example to fail. ``source``: C code that it writes. ``wanted``: value of
+    ``OMNIBOT_DRIVER_COMPILE``.
     """
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()

@@ -131,9 +131,9 @@ def test_the_wheels_stand_on_the_ground() -> None:
 
 
 def test_the_imu_hangs_upside_down() -> None:
-    """In the description, the IMU has the position that the vendor's drivers use.
+    """In the robot's description, the IMU is at the position that the vendor's drivers use.
 
-    Its z axis points down, and its x axis forward.
+    The z axis of the IMU points down, and the x axis forward.
     """
     joint = ROBOT.joint_map["imu_joint"]
     assert (joint.parent, joint.child) == ("base_link", "imu_link")

@@ -170,7 +170,7 @@ def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any
 def test_only_tools_need_what_an_extra_brings() -> None:
     """Only the tools import libraries of the extras, with one exception: rosbags.
 
-    A replay imports rosbags, and so does the module that the replay shares with a tool.
+    rosbags is also imported by the two modules that open recordings for a replay.
     """
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {

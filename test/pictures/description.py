@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The picture of the robot's description. A small ray tracer draws its cylinders and boxes."""
+"""Draws a picture of the robot from its URDF, with a small ray tracer for cylinders and boxes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -152,7 +152,7 @@ def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple
 
 
 def links() -> Iterator[Link]:
-    """Yield all visible parts of the robot, placed on the floor."""
+    """Yield all visible parts of the robot, which stands on the floor."""
     robot = URDF.from_xml_string(xacro.process_file(str(DESCRIPTION)).toxml())
     colours = {material.name: material.color.rgba for material in robot.materials}
     places = {"base_link": np.linalg.inv(pose(robot.joint_map["base_footprint_joint"].origin))}
@@ -218,7 +218,8 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
     """Draw transparent solids over the colours behind them, from the lowest to the highest.
 
-    A face hides more if the ray meets it at a flat angle.
+    A steep face hides 42 % of the colour behind it. Other faces hide 10 % if seen straight on, and
+    up to 40 % if seen at a flat angle.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

@@ -196,7 +196,7 @@ def trace(
 
 
 def since(found: Sequence[int | None]) -> int:
-    """Return the index of the first frame that arrived as a message.
+    """Return the index of the first frame for which the listener received a message.
 
     Earlier frames were sent before the listener was ready.
     """

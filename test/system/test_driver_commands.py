@@ -104,7 +104,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 ) -> None:
     """A command waits for 2 s, because the driver's executor is blocked. The driver refuses it.
 
-    The driver refuses a goal, too, even if the goal's stamp is recent.
+    The driver also refuses a goal that waited. The stamp in a goal does not matter.
     """
     hold = tmp_path / "hold"
     board: PtyBoard = start_board(control=control, running=True)

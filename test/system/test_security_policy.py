@@ -158,9 +158,9 @@ def test_operators_and_observers_may_read_all_commands(file: str) -> None:
 def test_a_node_of_each_enclave_may_answer_its_own_services_only(file: str) -> None:
     """A node of each enclave may offer the services that every rclpy node has.
 
-    The node must have the name in its enclave's profile. The operator's tools are the only nodes
-    that may choose their names freely. So no enclave except those of the driver and the operator
-    may answer in the driver's name.
+    The node must have the name in its enclave's profile, but the operator's tools may choose their
+    names. Only the driver's and the operator's enclaves may offer other services. So no other node
+    can answer in the driver's name.
 
     Regression: under SROS2, no node of these enclaves could start, because the policy allowed the
     nodes no services.

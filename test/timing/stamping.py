@@ -42,7 +42,8 @@ BOOT_S = 0.7123
 def ftdi_restarted(received: Received, random: Random) -> Chunks:
     """Return the chunks in which an FTDI adapter delivers the bytes.
 
-    The first byte of a packet starts the timer of this adapter. Later bytes do not restart it.
+    The first byte of a chunk starts the latency timer of this adapter. Later bytes do not restart
+    the timer.
     """
     chunks: Chunks = []
     start, timer = 0, math.inf

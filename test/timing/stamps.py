@@ -99,7 +99,7 @@ def lines_and_events(seconds: float, seeds: int) -> None:
     """Measure the stamps on each kind of line, without an event and with each kind of event.
 
     An event is a restart of the board or a stall of the host. Between events, the host reads
-    promptly. The results are written into the document.
+    promptly. The results are written into docs/internals/time.md.
     """
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]

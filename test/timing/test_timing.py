@@ -64,10 +64,10 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """An FTDI adapter whose timer cuts no frame delays all stamps by one frame's duration ±0.5 ms.
+    """If an FTDI timer cuts no frame in two, all stamps are late by one frame's duration ±0.5 ms.
 
-    Only a frame that the timer cuts in two would show the exact phase of the timer. Here, the
-    driver takes the middle of the possible phases, and errs by at most half of their range.
+    Only a cut frame would show the timer's exact phase. Without one, the driver assumes the middle
+    of the possible phases, so its error is at most half of their range.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver can determine the phase only to within

@@ -97,7 +97,7 @@ def test_a_speed_limit_is_not_taken_for_positional_control(
 def test_switch_and_deltas_are_told_by_the_data(
     planted: dict[str, Any], found: dict[str, str], tmp_path: Path
 ) -> None:
-    """The tool finds the control method and the meaning of the deltas from odometry alone."""
+    """The tool finds ``control_method`` and ``delta_frame`` from odometry alone."""
     with rig(tmp_path, **planted) as robot:
         assert robot.calibrate("commission", "--only", "board", draws=False) == 0
         assert robot.written().items() >= found.items()

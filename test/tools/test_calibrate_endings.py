@@ -41,7 +41,10 @@ def failing_late(figure: Any) -> None:
 
 @pytest.fixture
 def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
-    """Return a function that runs ``calibrate`` with a given result and returns its exit code."""
+    """Return a function that runs ``calibrate imu`` without a robot, and returns the exit code.
+
+    The result of the calibration is given by the arguments ``draw`` and ``found`` of the function.
+    """
 
     @contextmanager
     def connect(

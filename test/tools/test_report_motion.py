@@ -214,7 +214,7 @@ def test_a_front_wheel_may_turn_before_the_robot_moves(drive: Drive) -> None:
 
 
 def test_a_robot_with_two_wheels_that_never_moves_in_short_drives_is_wrong(drive: Drive) -> None:
-    """A Fejemis stands still in drives of 2 s each. The level of this finding is BAD.
+    """A Fejemis is commanded for 2 s at a time, and never moves. The report's finding is BAD.
 
     Regression: each drive was shorter than a slow start, so the report did not mention the
     standstill.

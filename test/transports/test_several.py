@@ -141,7 +141,8 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
     """A write does not wait for a full line, and the other line gets its data at once.
 
-    Later the full line is reported as missing, and its old data is discarded.
+    The full line accepts no data for 0.2 s, so the line is reported as missing, and its old data is
+    discarded.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])

@@ -194,7 +194,7 @@ def reset_clears_ticks_only(quirks: Quirks) -> bool:
 
 
 def gps_is_ignored(quirks: Quirks) -> bool:
-    """Return whether the board reports the position latitude 0, longitude 0."""
+    """Return whether the board reports latitude 0, longitude 0 instead of the GPS position."""
     return GpsPosition(0.0, 0.0) in Rig(quirks).run(4.0)
 
 

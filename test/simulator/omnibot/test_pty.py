@@ -27,7 +27,7 @@ def read_until(descriptor: int, wanted: bytes) -> bytes:
 
 
 def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
-    """Return a function that returns whether a board is in this mode."""
+    """Return a function that returns whether a board is in the mode ``mode``."""
     return lambda board: board.mode is mode
 
 

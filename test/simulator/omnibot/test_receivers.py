@@ -132,7 +132,10 @@ def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
 
 
 def test_the_window_takes_no_letter_soon_after_a_header() -> None:
-    """The window receiver ignores a letter if FF FE is among the last nine bytes."""
+    """A ``window`` receiver takes FF FE and the next seven bytes as a frame.
+
+    The receiver ignores a letter among these bytes.
+    """
     assert understood("FF FE 02 00 00 00 53 00 00 53", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0x0053, 0)),
         START,
@@ -184,7 +187,10 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A window receiver obeys a stop frame that lacks a byte, and the complete frame after it."""
+    """A stop frame lacks its last byte, and a complete stop frame follows.
+
+    A ``window`` receiver takes the next FF for the missing byte, and obeys both frames.
+    """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
         STOP,
@@ -249,7 +255,7 @@ def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> No
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """Some receivers count bytes during the boot among the three that wake the board."""
+    """Three bytes wake the board. Some receivers also count bytes that arrive during the boot."""
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()
     receiver.boot()
