@@ -22,8 +22,7 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit, in degrees, for the angle to the left that the board may read by mistake.
 
-If damage removes the minus sign of an angle to the right unnoticed, the board reads an angle to the
-left. The driver chooses the digits of each angle so that this angle is below the limit.
+If the minus sign of an angle to the right is lost unnoticed, the board reads an angle to the left.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

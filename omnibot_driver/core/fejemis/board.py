@@ -233,8 +233,8 @@ class FejemisBoard(Board):
     def wanted(self, *, estop: bool) -> None:
         """Latch or release the e-stop, according to a new order of the driver.
 
-        ``estop``: whether the order is an emergency stop. An emergency stop latches the e-stop, and
-        switches off the brush and the lift. Any other order releases the e-stop.
+        ``estop``: whether the order is an emergency stop, which also switches off the brush and the
+        lift.
         """
         if not estop:
             self._obedience.release(self._now)
@@ -312,8 +312,7 @@ class FejemisBoard(Board):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the packets that the guard sends if the driver fails: without and with e-stop.
 
-        Each item contains Stop, and the commands that switch the brush and the lift off. The second
-        item begins with the emergency stop.
+        Both items contain Stop, and switch the brush and the lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

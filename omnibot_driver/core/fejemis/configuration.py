@@ -41,9 +41,8 @@ The larger one applies, because the board prints few digits.
 HALF: Final = 0.51
 """Largest rounding error of a number that the board reports back, in units of its last digit.
 
-The value is 0.5 for rounding plus 0.01 for single precision. A larger deviation is not accepted,
-even if ``NEAR`` or ``DIGIT`` allows it. While the number of printed digits is unknown, only
-``NEAR`` and ``DIGIT`` apply.
+The value is 0.5 for rounding plus 0.01 for single precision. Larger deviations are rejected if the
+digits are known.
 """
 
 

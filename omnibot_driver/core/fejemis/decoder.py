@@ -19,9 +19,7 @@ LONGEST_LINE: Final = 200
 CHANGED_AFTER: Final = 2
 """Number of heartbeats in a row that must contradict ``sums`` before the decoder changes ``sums``.
 
-``sums`` says whether the board's lines have checksums. A heartbeat with a checksum contradicts the
-value False; a heartbeat without a checksum contradicts True. While ``sums`` is unknown, one
-heartbeat decides.
+While ``sums`` is unknown, one heartbeat decides.
 """
 
 
@@ -41,11 +39,10 @@ class FejemisDecoder:
 
     * ``sums``: whether the board's lines have checksums; None while unknown.
     * ``changed``: whether ``sums`` has changed. The caller resets this flag.
-    * ``doubtful``: whether the last line contradicts ``sums``. A heartbeat does not set this flag.
-      The flag is used only if the user's setting ``line_sums`` is auto. While the flag is True, the
-      driver's lines to the board have no checksum.
-    * ``contradicted``: whether the last line contradicts ``line_sums``. This flag is used only if
-      ``line_sums`` is on or off.
+    * ``doubtful``: with ``line_sums`` auto, whether the last line except heartbeats contradicts
+      ``sums``.
+    * ``contradicted``: with ``line_sums`` on or off, whether the last line contradicts
+      ``line_sums``.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -89,8 +89,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        True if the angle limits the speed, because each new angle changes this limit. Also True if
-        the lines have no checksums, because the board may obey a damaged line until the next line.
+        True if this angle limits the speed. Also True without checksums: the board may obey a
+        damaged line until the next line.
         """
         return self.held or not self._pair.with_sums
 

@@ -13,9 +13,8 @@ VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
 """Limits for the number of lines, among 24 of one kind, that differ from the learnt form.
 
-When the number reaches its limit, the driver stops the check of this kind of line, and accepts
-every form. ``VARIES`` is the limit for lines with a correct checksum, ``VARIES_WITHOUT_SUM`` the
-limit for other lines.
+At the limit, the driver accepts every form of this kind of line. ``VARIES`` is for lines with a
+correct checksum.
 """
 OF: Final = 24
 

@@ -132,9 +132,7 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        A message may show a restart of the board. Then the known times of the board and of its
-        lines are deleted. The messages before the restart need these times, so the caller must
-        handle them first.
+        A message that shows a restart of the board deletes the times that earlier messages need.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):
@@ -214,8 +212,8 @@ class Half:
     def _is_slow(self, now: float) -> bool:
         """Return whether the data stream that driving requires is much slower than requested.
 
-        True only if this call and the previous call have found too few lines. After a single such
-        call, lines may still wait to be read.
+        True only if two calls in a row have found too few lines, because lines may still wait to be
+        read.
         """
         assert self.role is not None
         count, since = self._needed, self._needed_since

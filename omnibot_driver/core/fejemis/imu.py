@@ -18,8 +18,8 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Limit for the time between the arrivals of two successive samples, in sampling periods.
 
-If both samples seem late, and this time is above the limit, an earlier sample was lost. If it is
-below the limit, the host has stalled.
+If both samples seem late, a longer time means that an earlier sample was lost, a shorter time that
+the host has stalled.
 """
 CYCLE_S: Final = 0.0015
 """Longest time in s that the board is assumed to need to send all lines of one control cycle."""
@@ -74,14 +74,11 @@ class ImuSamples:
     def sampled_s(
         self, arrived_s: float, not_before_s: float, next_pose_s: float, skipped: int
     ) -> float:
-        """Return the time at which the board took the next sample.
+        """Return when the board took the next sample. All times are in s of the board's clock.
 
-        All times are in s of the board's clock.
-
-        * ``arrived_s``: arrival time of the sample.
         * ``not_before_s``, ``next_pose_s``: times of the poses before and after the sample;
           infinity if the next pose has not arrived.
-        * ``skipped``: number of incomplete samples between the previous sample and this one.
+        * ``skipped``: number of incomplete samples since the previous sample.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -115,10 +112,7 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Update the phase of the sampling times after a new sample.
-
-        The new phase is as late as possible, except that the sampling time of a recent sample must
-        not be after its arrival.
+        """Update the phase of the sampling times: as late as recent arrivals permit.
 
         ``delay_s``: time in s from the sampling to the arrival of the new sample, by the old phase.
         """

@@ -25,14 +25,12 @@ PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
 """Limit, in s, for the time between a gyro line and an acceleration line that form a pair.
 
-If the time reaches this limit, the two lines may belong to different samples. Such a pair is used
-only if the next pose shows that no lines are missing.
+From this limit on, the pair is used only if the next pose shows that no lines are missing.
 """
 SILENT_S: Final = 0.1
 """Limit, in s, for a time without gyro and acceleration lines.
 
-After a longer time, lines may be missing, so new pairs of lines wait for the next pose. If the pose
-shows that lines are missing, these pairs are rejected.
+After a longer time, new pairs wait for the next pose, which shows whether lines are missing.
 """
 WARY_S: Final = 1.0
 """Time in s after a stall of the driver in which new pairs of lines wait for the next pose.
@@ -43,8 +41,8 @@ KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """``KNOWN_S``, ``SUREST_S``: limits, in s, for the magnitude of ``_evidence_s``.
 
-The sign of ``_evidence_s`` shows whether the gyro line or the acceleration line of a sample comes
-first. The sign is used from the magnitude ``KNOWN_S`` on. The magnitude is limited to ``SUREST_S``.
+From ``KNOWN_S`` on, the sign shows which line of a sample comes first. The magnitude never exceeds
+``SUREST_S``.
 """
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to the interval between a gyro and an acceleration line if another line
@@ -57,16 +55,11 @@ At this limit, ``ImuPairs`` decides which line of a sample comes first, even if 
 ``_evidence_s`` is still below ``KNOWN_S``.
 """
 MOST: Final = 10
-"""Limit for the magnitude of each counter in ``_outside``. At this limit, a counter stops.
-
-A counter is positive if a kind of line usually comes between two pairs of a gyro and an
-acceleration line, and negative if it usually comes between the two lines of a pair.
-"""
+"""Limit for the magnitude of each counter in ``_outside``. At this limit, a counter stops."""
 UNPOSED: Final = 20
 """Limit for the number of gyro lines, and of acceleration lines, since the last pose.
 
-If one of the two numbers is above this limit, the driver rejects a doubtful pair instead of waiting
-for the next pose.
+Above this limit, the driver rejects a doubtful pair instead of waiting for the next pose.
 """
 
 
@@ -74,9 +67,9 @@ for the next pose.
 class Pair:
     """A gyro and an acceleration line, probably of one sample.
 
-    * ``at``: time in s at which the second line arrived.
-    * ``pose_s``, ``next_pose_s``: the board's times of the poses before and after the pair;
-      infinity if the next pose has not arrived.
+    * ``at``: arrival time of the second line, in s.
+    * ``pose_s``, ``next_pose_s``: board times of the poses before and after the pair; infinity if
+      the next pose has not arrived.
     * ``skipped``: number of incomplete samples since the previous pair.
     * ``doubtful``: whether the pair must wait for the next pose.
     """
@@ -109,9 +102,10 @@ class ImuPairs:
         """The kind of line, gyro or acceleration, that comes first in a sample; None while
         unknown."""
         self._evidence_s = 0.0
-        """Sum of the intervals before gyro lines, minus the sum of those before acceleration lines,
-        in s. A positive sum shows that the gyro line of a sample comes first, because the interval
-        before the first line of a sample is longer.
+        """Sum of the intervals before gyro lines, minus the sum before acceleration lines, in s.
+
+        A positive sum shows that the gyro line comes first, because the longer interval precedes
+        the first line.
         """
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
@@ -121,15 +115,15 @@ class ImuPairs:
         self._outside: dict[str, int] = {}
         """A counter for each kind of line, except gyro and acceleration lines.
 
-        The counter is positive if lines of this kind usually come between two pairs of a gyro and
-        an acceleration line, and negative if they usually come between the two lines of a pair.
+        The counter is positive if this kind usually comes between two pairs, and negative if it
+        comes within a pair.
         """
         self._skipped = 0
         self._silent = False
         """Whether more than ``SILENT_S`` passed between two successive gyro or acceleration lines.
 
-        If True, lines may be missing, so each new pair is doubtful. The next pose resets this flag.
-        If no pose comes, ``take`` resets the flag when it rejects a doubtful pair.
+        If True, each new pair is doubtful. The next pose, or the rejection of a doubtful pair,
+        resets this flag.
         """
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
@@ -152,8 +146,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line. ``kind``: its keyword.
 
-        If a pair still waits for its second line, and lines of this ``kind`` do not usually come
-        between the two lines of a pair, the second line is regarded as lost.
+        A pair that waits for its second line is given up, unless such lines usually come within a
+        pair.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -168,8 +162,8 @@ class ImuPairs:
     def pose(self, time_s: float) -> None:
         """Receive the board's time of a pose, and accept or reject all waiting pairs.
 
-        Pairs are rejected if lines of both kinds, gyro and acceleration, are missing since the
-        previous pose, or if the time since the previous pose is unknown.
+        Pairs are rejected if both gyro and acceleration lines are missing since the previous pose,
+        or if the time since then is unknown.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
@@ -263,9 +257,8 @@ class ImuPairs:
     def _place(self, kinds: set[str], step: int) -> None:
         """Count where lines come: between two pairs, or within a pair.
 
-        The counters show where each kind of line usually comes. ``kinds``: kinds of lines that have
-        come. ``step``: number to add to the counters of these kinds: 1 if the lines came between
-        two pairs, -1 if they came within a pair.
+        ``kinds``: kinds of lines that have come. ``step``: 1 if the lines came between two pairs,
+        -1 if within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))

@@ -284,9 +284,8 @@ class Jobs:
 def _answers(role: Role, message: Message) -> bool:
     """Return whether ``message`` answers the query that the driver sends after ``eer``.
 
-    ``eer`` loads a configuration; the boards do not answer it. So the driver then sends a query:
-    ``confi`` to the drive board, ``fwoi`` to the front board. Some front boards do not know
-    ``fwoi``: their answer "unhandled" is accepted too.
+    The boards do not answer ``eer`` (load a configuration) itself. Some front boards do not know
+    the query ``fwoi``.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -2,9 +2,8 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Lines are repeated, because the board does not acknowledge them. Exception: the line of a lift
-command, even of 0 V, is sent once. Each line that moves the lift contains a run time, so the lift
-stops even if the line with 0 V is lost.
+The board does not acknowledge lines, so most lines are repeated. The line of a lift command is sent
+once: it contains a run time, after which the lift stops.
 """
 
 import math
@@ -114,8 +113,7 @@ class Machine:
     def switch_off(self) -> list[bytes]:
         """Switch off the brush and the lift, and return the lines that do this.
 
-        If the user has set the colour of the LED strip, the lines also end this colour: the board
-        shows its own lights again.
+        If the user has set the colour of the LED strip, the board's own lights return.
         """
         self.off()
         lights = [b"ledon 1", b"leds"] if self.colour else []

@@ -156,9 +156,9 @@ class WheelConfiguration:
 class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, in m.
 
-    ``first_m``, ``second_m``: the first and the second number of the line. The boards' help text
-    says that the track is second, but some boards report it first. ``digits``: for each number, the
-    unit of its last digit in the line; empty if unknown.
+    * ``first_m``, ``second_m``: the numbers in the line's order; on some boards, the track is
+      first.
+    * ``digits``: unit of each number's last digit; empty if unknown.
     """
 
     first_m: float

@@ -2,10 +2,9 @@
 
 """Writes motion lines (``rc``) in which damage is detected, or has a limited effect.
 
-Several lines command the same motion: the front board uses only the ratio of speed and turn rate,
-the drive board only the root of the sum of their squares. With a checksum, this module chooses
-a line in which the checksum detects the loss of any two characters. Without a checksum, some
-losses, such as the loss of a decimal point, give a wrong number that is valid until the next line.
+Several lines command the same motion. With a checksum, this module chooses a line in which the loss
+of any two characters is detected. Without a checksum, some losses give a wrong number, which is
+valid until the next line.
 """
 
 import math
@@ -77,8 +76,8 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """Return the drive board's line for a speed in m/s and a turn rate in rad/s.
 
-    The board's formula ignores the different units: the speed of the outer wheel, in m/s, is
-    sqrt(speed² + turn rate²). The sign of ``speed_mps`` gives the direction of the outer wheel.
+    By the board's formula, the outer wheel's speed in m/s is sqrt(speed² + turn rate²), with the
+    sign of ``speed_mps``.
     """
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
@@ -128,8 +127,8 @@ def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
     """Return the line with the lowest cost among the lines whose checksum reveals damage.
 
-    If there is no such line, return the line with the lowest cost of all. The cost shows how much a
-    line deviates from the commanded motion. ``signs``: the signs of speed and turn rate, as text.
+    If there is no such line, return the line with the lowest cost. ``signs``: signs of speed and
+    turn rate, as text.
     """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)

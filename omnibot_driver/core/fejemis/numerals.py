@@ -16,8 +16,7 @@ SMALLEST: Final = -4
 LARGEST: Final = 4
 """``SMALLEST``, ``LARGEST``: exponents of ten that limit the size of a safe number.
 
-A safe number is at least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``. The checksum of a
-line with safe numbers detects the loss of any two characters.
+A safe number is at least ``10 ** SMALLEST``, and less than ``10 ** LARGEST``.
 """
 
 
@@ -25,9 +24,8 @@ line with safe numbers detects the loss of any two characters.
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all safe numbers in rising order, and the text of each number.
 
-    The checksum of a line with safe numbers detects the loss of any two characters. ``negative``:
-    whether the line contains a minus sign. If True, the numbers contain no ``6``, because the
-    checksum does not detect the loss of ``-`` and ``6``.
+    ``negative``: whether the line contains a minus sign. If so, the numbers contain no ``6``: the
+    loss of ``-`` and ``6`` is undetected.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.

@@ -16,8 +16,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 DRAWN: Final = 0.25
 """Factor by which the driver corrects the wheels' motion towards a new pose.
 
-The correction is this factor times the difference between the wheels' motion and the motion to the
-pose. The factor applies if rounding of the pose can explain the difference.
+The factor applies if rounding of the pose can explain the difference from the wheels' motion.
 """
 ROUNDINGS: Final = 1.5
 """Largest difference between a pose and the wheels' motion that rounding of the poses can explain,
@@ -48,24 +47,19 @@ Each of these poses must agree with the rejected pose just before it.
 MOVED_FRAME: Final = 2
 """Number of rejected poses in a row that prove a new coordinate frame if the wheel speeds agree.
 
-Each of these poses must agree with the rejected pose just before it, and the wheel speeds must
-explain the motion between the two poses. Without agreement of the wheel speeds, ``NEW_FRAME`` poses
-are necessary.
+The wheel speeds must explain the motion to each of these poses from the rejected pose before it.
 """
 AGAIN_M: Final = 0.004
 AGAIN_RAD: Final = 0.012
 """``AGAIN_M``, ``AGAIN_RAD``: tolerances, in m and rad, between poses and the wheels' motion.
 
-If the board sets its pose to zero between two rejected poses, the difference of the poses
-contradicts the wheels' motion, and the second pose is not farther from zero than the wheels have
-moved. The driver makes both comparisons with these tolerances.
+With them, the driver detects that the board has set its pose to zero between two rejected poses.
 """
 LONGEST_JUMP_S: Final = 0.2
 """Longest time, in s, for which the driver trusts the wheel speeds more than the poses.
 
-The time begins with the last accepted pose. In this time, the driver rejects poses that contradict
-the wheel speeds, because another program may repeatedly reset the board's pose to zero (``enc0``).
-After this time, the driver trusts the poses, not the wheel speeds.
+The time begins with the last accepted pose. Later poses may be wrong: another program may
+repeatedly set the pose to zero (``enc0``).
 """
 
 
@@ -102,12 +96,8 @@ class PoseOdometry:
         self._driven: Pose | None = None
         """Motion from the last accepted pose to the last rejected pose; None while it is unknown.
 
-        The wheel speeds give the motion to the first rejected pose. Each further rejected pose adds
-        its difference from the rejected pose before it. If the coordinate frame may have moved
-        between these two poses, the motion by the wheel speeds is added instead.
-
-        The value is known only if the wheel speeds contradict the first rejected pose. The rejected
-        poses may then be in a new coordinate frame.
+        The motion is known only while the wheel speeds contradict the rejected poses, which may be
+        in a new coordinate frame.
         """
         self._speeds: WheelSpeeds | None = None
         self._before: WheelSpeeds | None = None
@@ -115,8 +105,8 @@ class PoseOdometry:
         self._speeds_new = False
         """Whether wheel speeds have arrived since the last pose.
 
-        ``_speeds_s``: board time of the last wheel speeds, in s. Wheel speeds get the time of the
-        first pose that arrives after them. ``_time_s``: board time of the last pose, in s.
+        ``_speeds_s``, ``_time_s``: board times of the last wheel speeds and the last pose, in s.
+        Wheel speeds get the time of the next pose.
         """
 
     @property
@@ -140,9 +130,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose) -> list[DisplacementReading | PoseReading]:
         """Return a list with the displacement from the previous pose; empty without a displacement.
 
-        There is no displacement if ``pose`` is the first one, or is rejected. Every 0.2 s, and when
-        a new coordinate frame begins, the list also contains a PoseReading: the sum of the frame's
-        first pose and all displacements returned in this frame.
+        Every 0.2 s, and at the start of a coordinate frame, a PoseReading follows: the frame's
+        first pose plus all returned displacements.
         """
         displacement = self.pose(pose)
         if displacement is None:
@@ -205,6 +194,8 @@ class PoseOdometry:
             # The board computes poses and wheel speeds from the same encoders. So the poses have a
             # new origin, even if the robot could have driven to this place.
             off = way - rolled
+            # If the board set its pose to zero again, the new pose contradicts the wheels' motion,
+            # and is not farther from zero than the wheels have moved.
             moved_again = not _within(off, Pose()) and _within(_place(pose), rolled)
             self._driven = self._driven.moved(roll(rolled if moved_again else way))
             if self._near(off, seconds):
@@ -226,11 +217,8 @@ class PoseOdometry:
     def _driven_to(self, pose: BoardPose, since_s: float) -> Pose | None:
         """Return the motion from the last accepted pose to ``pose``, by the wheel speeds.
 
-        ``pose``: the first rejected pose after the accepted one. ``since_s``: time in s since the
-        accepted pose.
-
-        Return None if the wheel speeds are unknown, or if rounding of the poses may explain the
-        rejection. Otherwise, the rejection may mean that the board uses a new coordinate frame.
+        None if the wheel speeds are unknown, or if rounding may explain that ``pose`` was rejected.
+        ``since_s``: time in s since the accepted pose.
         """
         assert self._pose is not None
         digit_m = 10.0 ** -max(pose.decimals, self._pose.decimals)

@@ -76,9 +76,8 @@ class Ports:
     def identify(self) -> bool:
         """Find out which board is at which port. Call this after a heartbeat.
 
-        Return whether the two boards have exchanged their ports since both boards were last known.
-        When both boards become known for the first time, return whether the drive board is at the
-        second port.
+        Return whether the boards have exchanged their ports since both were last known. Initially,
+        the drive board is expected at the first port.
         """
         first, second = (half.role for half in self.halves)
         if first == second:
@@ -116,9 +115,8 @@ class Ports:
     def ending(self, role: Role, *texts: bytes) -> Packets:
         """Return lines that stop or switch off something on the board with this ``role``.
 
-        If the port of this board is unknown, the lines go to each port at which no board is known
-        yet. If both ports have known boards, but neither board has this role, the lines go to both
-        ports.
+        While the port of this board is unknown, the lines go to each port without a known board, or
+        else to both ports.
         """
         if self.half(role) is not None:
             return self.line(role, *texts)

@@ -23,8 +23,7 @@ angle, in rad, at which a turn on the spot may begin, and may continue.
 GIVEN_RAD: Final = math.radians(5.0)
 """Angle, in rad, that sets the tolerance of the body's velocity while the front wheel turns.
 
-The tolerance, in m/s, is the commanded speed at the front wheel times the sine of this angle. The
-robot drives slowly enough to stay within the tolerance.
+The tolerance, in m/s, is the commanded speed at the front wheel times the sine of this angle.
 """
 
 

@@ -35,8 +35,7 @@ The clock begins anew if at least ``AGAIN`` implausible board times in a row agr
 EARLIES_WITHIN_S: Final = 1.0
 """Limit, in s, for the time from the first to the last of three lines that seem early.
 
-If a clock began with a line that arrived late, later lines seem to arrive early. So if three
-(``AGAIN``) lines seem early within this time, and their board times agree, the clock begins anew.
+If their board times agree, the clock began with a late line, and begins anew.
 """
 FASTEST: Final = 1.001
 """How fast a board's clock runs at most, as a multiple of the host's."""
@@ -69,8 +68,7 @@ class TeensyClock:
         self._earlies: list[tuple[float, float]] = []
         """Board times of lines that seem to arrive early by the clock, each with its arrival time.
 
-        The lines are early by at most ``LATE_S``. The board times agree with each other: they
-        advance like the arrival times (``AGREE_S``).
+        The lines are early by at most ``LATE_S``, and their board times agree (``AGREE_S``).
         """
         self._last_s = 0.0
         self.connect()
@@ -151,8 +149,8 @@ class TeensyClock:
     def _began_late(self, board_s: float, now: float) -> bool:
         """Begin the clock anew if the clock began with a line that arrived late.
 
-        By such a clock, later lines seem to arrive early. Three (``AGAIN``) early lines are
-        necessary, with board times that agree. Return whether the clock has begun anew.
+        Return whether the clock has begun anew. Three (``AGAIN``) early lines with board times that
+        agree are necessary.
         """
         agree = all(
             before_s < board_s

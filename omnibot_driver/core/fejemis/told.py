@@ -2,8 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-Some notices make the driver stop the robot. The driver gets such a notice each time, so that it
-stops the robot, but the text is empty if the user has seen it in the last 10 s.
+The driver gets each notice that stops the robot, with an empty text if the user has seen the text
+in the last 10 s.
 """
 
 import math
