@@ -90,8 +90,7 @@ class LoisEcuBoard(Board):
     def shows_standstill(self) -> bool:
         """Whether unchanged ticks would show that both wheels are at rest.
 
-        With the public firmware, they show it only while the RPM targets of both wheels are
-        positive: the firmware counts no ticks of a wheel with another target.
+        The public firmware counts ticks of a wheel only while its RPM target is positive.
         """
         return self._ecu.translation.odometry.counting
 
@@ -286,7 +285,7 @@ class LoisEcuBoard(Board):
         """Request a record of ``samples`` samples, for example of times between ticks.
 
         A later reading contains the record, or the reason why there is none. Raises RequestRefused,
-        for example for a record that is too long, or in a terminal mode.
+        for example for too many samples.
         """
         self._ecu.record(kind, samples)
 

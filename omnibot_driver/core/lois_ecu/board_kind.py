@@ -16,8 +16,7 @@ from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 LONE_TICKS: Final = 2
 """Number of tick reports after which the driver can recognise a board of the manual's kind.
 
-After this number, an odometry report with the command byte 0x20 shows that the board works as the
-manual describes. The public firmware uses the command byte of tick reports (0x12) instead.
+The sign of such a board is an odometry report with the command byte 0x20.
 """
 UNCOUNTED_M: Final = 0.06
 """Distance in m, summed over both wheels. If the wheels roll backward for this distance and no
@@ -65,8 +64,7 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts no ticks while a wheel rolls backward.
 
-        The driver decides this if wheels roll backward for more than ``UNCOUNTED_M`` (m), and no
-        count has ever decreased. ``told``: motion between the last two odometry reports, or None.
+        ``told``: motion between the last two odometry reports, or None.
         """
         if told is None or not self._motion.signed or self._seen_signed:
             return

@@ -36,8 +36,8 @@ the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
 """Margin, in s, beyond which the delay of a tick report is irregular.
 
-A delay is irregular if it is below 0 by more than this margin, or exceeds the largest recent delay
-by more than this margin. Delays are measured from the fitted clock.
+A regular delay, by the fitted clock, lies between 0 and the largest recent delay, with this margin
+on both sides.
 """
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
@@ -60,8 +60,8 @@ class BoardTime:
         self._behind_s = [0.0, 0.0]
         """Two values in s: how far the board's clock has fallen behind since the first tick report.
 
-        The first value assumes that the clock always runs (manual). The second value assumes that
-        the clock stops while the board sends (public firmware).
+        The first value assumes that the clock always runs (manual), the second that it stops during
+        sending (public firmware).
         """
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
@@ -90,8 +90,8 @@ class BoardTime:
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
         """Return the delay of a tick report in s by the fitted clock, and whether it is irregular.
 
-        A late read does not explain an irregular delay. While too few reports are stored, the
-        result is 0 and False. This method never stores the report.
+        A late read does not explain an irregular delay. With too few stored reports, the result is
+        0 and False.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -32,9 +32,7 @@ class Coasting:
     def unsure_mps(self, now: float, step_s: float) -> float:
         """Return the speed's standard deviation at ``now``, in m/s, with the sign of the speed.
 
-        The standard deviation is half the difference between two estimates of the speed. The lower
-        estimate assumes a fast deceleration that begins at once. The higher one assumes a slow
-        deceleration that begins after ``step_s``, the period of the speed controller in s.
+        ``step_s``: period of the speed controller in s, by which the deceleration may be delayed.
         """
         age_s = now - self.heard_s
         slow_mps = self._speed_after((1 + COAST_PART) * age_s)

@@ -38,10 +38,10 @@ TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
 """Variances of the errors of the board's reports, in squared ticks.
 
-* ``TICK_VARIANCE``: error of a tick count.
-* ``TURN_VARIANCE``: error of the heading in the board's odometry (0x20), as a difference of the
-  distances of the two wheels.
-* ``ALONG_VARIANCE``: error of the distance in the board's odometry (0x20).
+* ``TICK_VARIANCE``: tick count.
+* ``TURN_VARIANCE``: heading in the board's odometry (0x20), as a difference of the distances of the
+  two wheels.
+* ``ALONG_VARIANCE``: distance in the board's odometry (0x20).
 """
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
@@ -58,12 +58,10 @@ this number of ticks. Otherwise, the next tick may not be due yet.
 """
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""Limits for the difference between a value in the board's odometry and the expected value.
+"""``LEAP`` (standard deviations), ``LEAP_M`` (m): limits for deviations of the board's odometry.
 
-``LEAP`` is in standard deviations. ``LEAP_M`` is in m: a heading is compared as the difference of
-the two wheels' distances. A heading is ignored if its difference exceeds both limits: the board has
-computed such a heading from an outdated wheel speed. A distance is ignored if its difference
-exceeds ``LEAP``.
+A heading, as a difference of the two wheels' distances, is ignored above both limits; a distance is
+ignored above ``LEAP``.
 """
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
@@ -74,20 +72,19 @@ SWINGING_M: Final = 0.055
 SWERVED_M: Final = 0.05
 """Standard deviation, in m, of the errors of the robot's x and y after a wheel has rolled 1 m.
 
-These errors are added only at an oscillating speed, and without counted ticks. ``SWINGING_M`` is
-the error of the wheel's distance.
+These errors occur only at an oscillating speed, and without counted ticks.
 """
 LOST_PART: Final = (0.15, 0.35)
-"""Standard deviation of the distance that a wheel rolled while reports were lost, as a fraction of
-this distance. The first value is for a steady speed, the second for an oscillating speed. Only for
-a wheel without counted ticks.
+"""Standard deviation of a distance rolled while reports were lost, as a fraction of this distance.
+
+The values are for a steady and for an oscillating speed, of a wheel without counted ticks.
 """
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""Factor for the error that remains after a report has corrected a wheel's distance.
+"""Standard deviation of a wheel's distance after a correction, as a fraction of the excess.
 
-A correction of more than ``CORRECTED_TICKS`` (in ticks) leaves an error. Its standard deviation is
-the factor times the excess. Only for a wheel without counted ticks.
+The excess is the correction above ``CORRECTED_TICKS`` (in ticks). Only wheels without counted ticks
+have this error.
 """
 LATE_PART: Final = 0.6
 """Standard deviation of a wheel's distance after a late report, as a fraction of the distance
@@ -129,9 +126,7 @@ class Comparison:
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
-        Also return whether the difference is too large for an error of the motion filter. While the
-        board does not count, the difference is 0.
-
+        Also return whether the difference is too large for an error of the motion filter.
         ``late_s``: how much later than usual the report arrived.
         """
         motion = self._motion
@@ -308,6 +303,7 @@ class Comparison:
         doubtful = [
             index for index, wheel in enumerate(motion.wheels) if wheel.blind and not wheel.locked
         ]
+        # A heading beyond both limits was computed from an outdated wheel speed.
         leaps = residual * residual > LEAP**2 * unsure and abs(residual) > LEAP_M
         if leaps or not doubtful:
             self.begin_odometry()

@@ -190,8 +190,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop; None if tick reports do not show this.
 
-        Two kinds of reports show nothing: old ones, and those of the public firmware after RPM 0/0
-        or a backward command.
+        Old reports show nothing. Nor do reports of the public firmware after RPM 0/0 or a backward
+        command.
         """
         points, translation = self._points, self._translation
         if points.stood:

@@ -39,9 +39,8 @@ class DecoderStatistics:
 class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
-    * ``sum_required``: whether to discard all lines without a checksum. If False, they are
-      discarded only while the board sends checksums, because a line that loses two characters looks
-      like a line without a checksum.
+    * ``sum_required``: whether to discard lines without a checksum even while the board sends no
+      checksums.
     * ``terminal``: whether text outside the protocol is regarded as a sensor's line, not as damage.
     * ``times``: for each report of the last call, the arrival time of its last line, in s.
     """
@@ -164,6 +163,7 @@ class LoisDecoder:
             self._doubted = SURE_AFTER
         elif not self.sum_required:
             line = line_of(text, sum_required=False)
+            # A line that has lost two characters looks like a line without a checksum.
             if line is not None and self._doubted:
                 self._doubted -= 1
                 return None

@@ -29,10 +29,8 @@ def twist_variances(
 ) -> tuple[float, float]:
     """Return the variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
-    ``coasting_mps``: for the left and the right wheel, the error of the speed while the wheel
-    coasts, in m/s: one standard deviation, with the sign of the wheel's speed. The errors of the
-    two wheels are correlated. Errors of the same sign add up in the robot's speed, errors of
-    opposite signs in the yaw rate.
+    ``coasting_mps``: for each wheel, the standard deviation of its speed while coasting, with the
+    speed's sign. The wheels' errors are correlated.
     """
     left, right = SPEED, PER_WHEEL + SPEED
     speed = motion.variance_of([(left, 0.5), (right, 0.5)])

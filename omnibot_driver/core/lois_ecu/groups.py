@@ -40,8 +40,7 @@ LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
 """Longest allowed time between two lines of a group, as a fraction of the group's period.
 
-The period is the time between the last two groups with the same command byte. The allowed time is
-at least ``QUIET_S``, and at most ``LATE_S``.
+The allowed time is at least ``QUIET_S``, and at most ``LATE_S``.
 """
 
 # Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the

@@ -10,9 +10,10 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Increase of the largest accepted heading error, as a fraction of the robot's turn. A heading is
-accepted at once if it differs from the expected heading by at most ``NEAR_DEG + NEAR_PART * turn``
-degrees. ``turn``: change of the odometry's yaw since the last accepted heading, in degrees.
+"""Increase of the largest accepted heading error, as a fraction of the robot's turn.
+
+The turn is measured since the last accepted heading. ``NEAR_DEG`` is the limit without a turn, in
+degrees.
 """
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0

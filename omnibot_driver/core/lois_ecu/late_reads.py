@@ -15,9 +15,10 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Longest usual time in s without a report. If no report comes for a longer time, and several tick
-reports then arrive together, the computer has read them late. The driver corrects the times of
-these reports. ``BoardTime`` handles shorter delays.
+"""Longest usual time in s without a report.
+
+If several tick reports arrive together after a longer time, the computer has read them late. The
+driver corrects their times.
 """
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
@@ -56,15 +57,14 @@ class LateReads:
     ) -> list[float]:
         """Return the times in s of reports that were read together.
 
-        If a clock in ns may have wrapped or restarted, the arrival times are returned.
-
-        * ``arrived``: for each report, the time in s at which its last line was read.
+        * ``arrived``: for each report, the arrival time of its last line, in s.
         * ``unit``: the unit of the board's clock; None if it is unknown at present.
         """
         self._unit = unit or self._unit
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]
         known = [self._last.ticks] if self._last else []
         known += [ticks for _, ticks in told]
+        # If a clock in ns may have wrapped or restarted, the arrival times are used.
         shown = self._unit == "ms" or not any(map(self._may_have_restarted, known, known[1:]))
         found, before = list(arrived), self._last
         leading_s = before.at_s if before and self._waited and not told else math.inf
@@ -86,8 +86,7 @@ class LateReads:
     def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the corrected time in s of a tick report.
 
-        * ``late``: whether this report and later tick reports arrived together, after a gap of more
-          than ``LATE_S``.
+        * ``late``: whether later tick reports arrived with this one, after a gap above ``LATE_S``.
         * ``shown``: whether the board's clock shows the time since the last tick report.
         """
         last, waited, at_s = self._last, False, arrived_s
@@ -112,9 +111,8 @@ class LateReads:
     def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
         """Return whether the board may have restarted between two tick reports.
 
-        A restart sets the board's clock and its tick counts to zero. The clock alone does not show
-        a restart, because a clock in ns also wraps every 4.3 s. So the counts must have become
-        smaller, and must fit the time since the clock's zero.
+        The board's clock alone does not show a restart, because a clock in ns also wraps every 4.3
+        s.
         """
         fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
         return fewer and began_within(math.inf, after, self.ticks_per_revolution)

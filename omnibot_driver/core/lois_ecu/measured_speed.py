@@ -30,16 +30,15 @@ FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Growth of the error variance of the board's odometry (0x20), in squared ticks per s.
 
-The variance grows while a wheel is faster than ``FAST_TICKS_PER_S``. The board notices ticks late
-while it sends, so its odometry misses a part of the motion.
+The variance grows while a wheel is faster than ``FAST_TICKS_PER_S``.
 """
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
     """Predict what the board measures in a step: the speeds of the wheels, and its odometry (0x20).
 
-    The prediction is stored in ``step``. ``before``: speeds of the left and right wheel at the
-    beginning of the step, in m/s.
+    The prediction is stored in ``step``. ``before``: speeds of the left and right wheel before the
+    step, in m/s.
     """
     dt, new = step.dt, step.new
     turn: Terms = [(TURN, 1.0)]
@@ -56,6 +55,7 @@ def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, floa
             new[ALONG] -= lost / 2
             spread = START_STDDEV_TICKS * motion.tick_m
             step.noises.append(([(TURN, side), (ALONG, 0.5)], spread**2))
+        # The board notices ticks late while it sends, so 0x20 misses a part of the motion.
         if speed > FAST_TICKS_PER_S * motion.tick_m:
             variance = LOST_TICKS * motion.tick_m**2 * dt
             step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))

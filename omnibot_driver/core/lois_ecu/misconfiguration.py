@@ -26,8 +26,8 @@ OWN_GAINS: Final = (
     " nearly all drives, and by 2.2 m in one of 150. Run `calibrate step`, or set these parameters"
 )
 """Advice if the user has not set all gains; the braces stand for the names of the missing gains.
-The odometry errors in this text were measured in 150 forward drives with a build of the public
-firmware.
+
+The odometry errors were measured in 150 forward drives with a build of the public firmware.
 """
 TOO_FAST: Final = 5
 TOO_FAST_ADVICE: Final = (
@@ -59,8 +59,8 @@ _OMNIBOT: Final = re.compile(rb"\xff[\xfa\xfb\xfc]|Paused: ")
 class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
-    Call ``look`` with all received bytes. After each read that contains reports, call
-    ``understood()``, and pass the reports to ``heard``.
+    Call ``look`` with all received bytes. After a read with reports, call ``understood()`` and
+    ``heard``.
 
     * ``advice``: what the user should check, or None.
     * ``no_ticks``: whether the board sends reports, but no ticks.

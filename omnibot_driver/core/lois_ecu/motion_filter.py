@@ -47,9 +47,9 @@ LATE_PART: Final = 0.6
 """Assumed standard deviation of the time at which a command takes effect, as a fraction of the
 speed controller's period."""
 ROLLS_S: Final = 0.1
-"""Standard deviation, in s, of the time for which a wheel rolls on after an RPM set-point has cut
-the motor's power. The error of the distance is this time multiplied by the wheel's speed. Motors
-and friction are unknown.
+"""Standard deviation, in s, of the time that a wheel rolls on after an RPM set-point cuts power.
+
+Motors and friction are unknown.
 """
 REVERSES_S: Final = 0.2
 """Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign. The
@@ -77,11 +77,10 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest estimated difference (m/s) between the two wheel speeds measured by the board.
+        """Smallest estimated difference (m/s) of both measured speeds since the last comparison.
 
-        The value covers the time since the board's distance was last compared with the estimated
-        distance. If the value is small, the speeds may have been equal. The public firmware does
-        not update its position then, so the board's distance may be too short.
+        At equal speeds, the public firmware does not update its position, so the board's distance
+        may be too short.
         """
         self.speed_errors = SpeedErrors(self)
         self.history = FilterHistory(self.filter)
@@ -175,7 +174,7 @@ class MotionFilter:
         """Increase the uncertainty of a wheel's distance, and of all states that depend on it.
 
         ``stddev_m``: standard deviation to add. ``counted``: whether the board counted the wheel's
-        ticks at the time of the error; the count then becomes uncertain too.
+        ticks when the error arose; the count then becomes uncertain too.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)

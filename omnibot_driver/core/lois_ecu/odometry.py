@@ -2,9 +2,8 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-The public firmware does not count ticks in a backward drive, for example. The driver then predicts
-the motion from the commands, and corrects it by the board's own odometry (0x20). All times are
-arrival times in s; the caller passes the time.
+While the board counts no ticks, the driver predicts the motion from the commands, and corrects it
+by the board's own odometry (0x20). All times are arrival times in s.
 """
 
 import math
@@ -55,9 +54,8 @@ class LoisOdometry:
         self._estimated = False
         """Whether an estimate has been made since the odometry's time last advanced.
 
-        After an estimate, the wheels' ``blind`` flags (motion without counted ticks) stay until the
-        time advances: an odometry report in the same read can still correct the motion. The advance
-        then sets the flags to False.
+        If so, the next advance resets the wheels' ``blind`` flags. An odometry report in the same
+        read may still need these flags.
         """
         self._may_roll_mps = 0.0, 0.0
         """Largest speed, in m/s, that each wheel can have had since the last report."""
@@ -149,10 +147,8 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether a restart of the board is the only explanation for counts near zero.
 
-        The counts must contradict the predicted motion. If the robot is at rest, they must also be
-        at most ``NUDGED_TURNS``.
-
-        ``late_s``: how much later than usual the ticks arrived.
+        For a robot at rest, counts above ``NUDGED_TURNS`` do not show a restart. ``late_s``: how
+        much later than usual the ticks arrived.
         """
         found, per_turn = self._unforeseen(ticks, now, late_s), self._settings.ticks_per_revolution
         most = max(NUDGED_TURNS * per_turn, 1)
@@ -256,10 +252,8 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process an odometry report. It corrects the predictions and estimates that follow.
 
-        In the manual, the message is 0x20. The public firmware sends 0x12 instead, directly after
-        the ticks.
-
-        ``late_s``: how much later than usual the report arrived, in s.
+        The message is 0x20 (manual) or 0x12 (public firmware). ``late_s``: how much later than
+        usual the report arrived, in s.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
@@ -340,9 +334,8 @@ class LoisOdometry:
     def _blind(self) -> bool:
         """Whether the ticks of at least one wheel do not show the wheel's motion.
 
-        The board does not always count the ticks of a wheel (see ``Wheel.blind``). If a wheel still
-        rolls backward after its set-point has changed, the board counts the ticks as forward
-        motion.
+        The board may count no ticks (``Wheel.blind``), or may count backward motion as forward
+        after a new set-point.
         """
         return not self._motion.signed and any(
             wheel.blind or (wheel.rolls_on and wheel.rolls_on_s) for wheel in self._motion.wheels

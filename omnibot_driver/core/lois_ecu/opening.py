@@ -47,10 +47,10 @@ LONGEST_WAIT_S: Final = 0.5
 """Longest time in s for which set-points may delay a setting. On a very busy computer, a set-point
 may be due each time that a setting could be sent."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s after a report, which the driver uses in turn. After a tick report, such a delay
-passes before the driver writes the settings again. After any report, it passes before the driver
-requests a GPS date. The board cannot receive while it sends: after a constant delay, every line
-could coincide with a report, and be lost."""
+"""Delays in s, used in turn, from a report to a round of settings or to a request of a GPS date.
+
+The board cannot receive while it sends: after a constant delay, every line could be lost.
+"""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest accepted difference between the measured and the set period of the tick reports, as a
 fraction of the set period. Within it, the set period is confirmed."""
@@ -64,15 +64,17 @@ RECOVER_AFTER_S: Final = 3.0
 """Time in s without an answer after which the driver restores the board's mode. It is longer than a
 boot, which takes two seconds."""
 UNANSWERED_S: Final = 5.0
-"""Time in s without the requested GPS date after which the driver restores the board's mode. If the
-board sends reports but no date, it may not obey requests. The driver cannot rely on writing the
-settings again: after ``ROUNDS`` rounds, it writes them only after a tick report, and a bad line may
-lose all tick reports."""
+"""Time in s without the requested GPS date after which the driver restores the board's mode.
+
+Such a board may obey no requests, and may send no tick reports, which a new round of settings
+needs.
+"""
 RESYNC: Final = b"::"
-"""Two extra colons between a line with a checksum and a line without. A board that expects no
-checksums stores the surplus characters of the first line until the next ``:``. If the ``:`` of the
-second line and one more character were lost, the stored characters and the second line could form
-a motion command. The extra colons prevent this."""
+"""Two extra colons between a line with a checksum and a line without.
+
+If the board expects no checksums, the colons prevent that two lost characters turn the lines into a
+motion command.
+"""
 
 
 class SettingsWriter:
@@ -136,10 +138,11 @@ class SettingsWriter:
     def _waits(self) -> bool:
         """Whether the driver must wait until the robot stops before it writes more settings.
 
-        While the robot drives, the driver writes all settings at most ``ROUNDS`` times, because
-        each written gain resets the controller of a wheel. The driver completes a round that has
-        begun, because a later command of the round may restore what an earlier one has overwritten.
+        While the robot drives, the driver writes at most ``ROUNDS`` rounds: each written gain
+        resets the controller of a wheel.
         """
+        # A round that has begun is completed: a later command of the round may restore what an
+        # earlier one has overwritten.
         return self._points.driving and self._rounds >= ROUNDS and not self._queue
 
     @property
@@ -179,8 +182,8 @@ class SettingsWriter:
     def repeat(self, now: float) -> None:
         """Write all settings again, as soon as no motion is commanded.
 
-        The caller has detected a wheel that does not start. Perhaps the board has lost all lines
-        that set the low-pass coefficient, or it expects checksums although the driver sends none.
+        Call this method if a wheel does not start. The board may lack the low-pass coefficient, or
+        expect checksums.
         """
         if self.done:
             self._rounds_left, self._round_at_s = ROUNDS, now
@@ -261,17 +264,16 @@ class SettingsWriter:
     def _encoded(self, command: Command) -> bytes:
         """Return the line of ``command``, with a checksum if the user's setting says so.
 
-        Two commands are exceptions:
-
-        * A terminal mode is sent in two lines while the settings are unconfirmed, and after a call
-          of ``repeat``. The first line has a checksum, because a board that has just booted obeys
-          only such lines; the second line has none. If no motion is commanded, a Stop follows,
-          because a board that expected checksums has ignored the earlier Stops.
-        * Stop never has a checksum (see ``_begin_round``).
+        * A terminal mode may be sent in two lines, with and without a checksum, before a Stop.
+        * Stop never has a checksum.
         """
+        # If two zeros of a Stop with a checksum were lost, the board would read the checksum as a
+        # duty.
         if command == outbound.STOP:
             return encode_command(command, with_sum=False)
         line = outbound.lines(command, with_sum=self.settings.with_sum)
+        # A board that has just booted obeys only a line with a checksum. A board that expected
+        # checksums has ignored the earlier Stops.
         if isinstance(command, SetTerminalMode) and (self._repeated or not self.confirmed):
             stop = [] if self._points.driving else [outbound.STOP]
             line = _both_forms(command) + outbound.lines(*stop, with_sum=False)
@@ -281,12 +283,6 @@ class SettingsWriter:
         """Begin the next round: queue the commands that write all settings.
 
         Do nothing if no round is left, or if commands of the previous round still wait to be sent.
-
-        Another program may have switched the board's checksums off while the robot rolls. The board
-        then ignores a Stop with a checksum. So while the settings are unconfirmed, each of the
-        first ``ROUNDS`` rounds begins with a Stop without a checksum. With ``checksum: false``, a
-        Stop follows each terminal mode instead (see ``_encoded``). A Stop with a checksum would be
-        dangerous: if two of its zeros were lost, the board would read its checksum as a duty.
         """
         if self._queue or not self._rounds_left:
             return
@@ -294,6 +290,9 @@ class SettingsWriter:
         self._rounds += 1
         self._round_at_s = max(now, self._round_at_s) + ROUND_S
         at_s = now
+        # Another program may have switched the board's checksums off while the robot rolls. The
+        # board then ignores a Stop with a checksum. With ``checksum: false``, a Stop follows each
+        # terminal mode instead.
         if self.settings.with_sum and self._rounds <= ROUNDS and not self.confirmed:
             self._queue.append((now, outbound.STOP))
             at_s += LINE_S  # a write of its own: its beginning must not meet the end of a setting
@@ -313,12 +312,10 @@ class SettingsWriter:
     def _writes_ticks(self, now: float) -> bool:
         """Return whether the round of settings that begins now writes the tick reports' period.
 
-        Each write restarts the period on the board, so the next tick report comes later. If each
-        round wrote a long period, no tick report might come until the rounds are over. So the
-        driver writes a long period again only after a tick report, or after ``TICKS_DUE_S`` without
-        tick reports. After ``ROUNDS`` rounds, only every third round writes the period, because
-        only tick reports at undisturbed intervals can confirm the period.
+        Each write delays the next tick report. Only tick reports at undisturbed intervals can
+        confirm the period.
         """
+        # If each round wrote a long period, no tick report might come until the rounds are over.
         awaited = self._ticks_written_at_s > self._ticks_at_s > now - TICKS_DUE_S
         return not (awaited and slow_ticks(self.settings)) and (
             self._rounds <= ROUNDS or not self._rounds % 3
@@ -343,6 +340,9 @@ class SettingsWriter:
 
 
 def _both_forms(mode: SetTerminalMode) -> bytes:
+    # A board that expects no checksums stores the surplus characters of the first line until the
+    # next ``:``. Without RESYNC, the stored characters and a second line that has lost its ``:``
+    # and one more character could form a motion command.
     return encode_command(mode, with_sum=True) + RESYNC + encode_command(mode, with_sum=False)
 
 

@@ -28,9 +28,10 @@ MOST_PERCENT: Final = 100
 # After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
 # 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""Number of times that RPM 0/0 is sent after a Stop, because lines may be lost. If the robot drives
-again before the number is reached, RPM 0/0 is also sent before each RPM set-point, until the number
-is reached."""
+"""Number of times that RPM 0/0 is sent after a Stop, because lines may be lost.
+
+If the robot drives again earlier, RPM 0/0 precedes each RPM set-point until the number is reached.
+"""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:

@@ -106,13 +106,9 @@ class Gate(Generic[Group]):
 class TicksGate(Gate[Ticks]):
     """Check of the reports of encoder ticks.
 
-    When the driver has found out whether the board's clock counts ms or ns, the clock in each
-    further report must fit this unit.
-
-    ``ticks_per_revolution``: may be replaced at any time.
-
-    ``too_fast``: number of reports in a row that were rejected for an impossible speed, although
-    their clock is plausible.
+    * ``ticks_per_revolution``: may be replaced at any time.
+    * ``too_fast``: number of reports in a row that were rejected for an impossible speed, although
+      their clock is plausible.
     """
 
     def __init__(self, ticks_per_revolution: int) -> None:

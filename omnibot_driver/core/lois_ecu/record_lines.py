@@ -28,10 +28,10 @@ class GroupStatistics:
 
     A group is the lines of one report.
 
-    * ``damaged_groups``: number of discarded groups and records.
-    * ``damaged_records``: number of discarded records alone.
-    * ``implausible``: number of complete groups with values that are not plausible.
-    * ``unknown_lines``: number of valid text lines that are not a report.
+    * ``damaged_groups``: discarded groups and records.
+    * ``damaged_records``: discarded records alone.
+    * ``implausible``: complete groups with values that are not plausible.
+    * ``unknown_lines``: valid text lines that are not a report.
     """
 
     damaged_groups: int = 0
