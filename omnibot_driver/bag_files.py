@@ -51,8 +51,7 @@ def messages(
 ) -> Iterator[tuple[Connection, int, bytes]]:
     """Yield the messages up to the first error in the bag; add this error to ``troubles``.
 
-    rosbags does not report a damaged part of an mcap file, but skips it. So this function also adds
-    a text if fewer messages were read than the bag's index has.
+    Also add a text if the bag's index has more messages than were read.
     """
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
@@ -71,6 +70,7 @@ def messages(
     except Exception as error:  # a damaged file may cause any error in the library
         troubles.append(f"{reader.path} cannot be read to its end: {in_a_line(error)}")
         return
+    # rosbags skips a damaged part of an mcap file, and does not report it.
     if count < (total := sum(item.msgcount for item in wanted)):
         troubles.append(f"{reader.path} is damaged: only {count} of {total} messages can be read")
 

@@ -58,8 +58,8 @@ def names(path: Path) -> list[str]:
 def save(path: Path, values: Mapping[str, Any]) -> None:
     """Write these values into the file, completely or not at all; keep its other values.
 
-    Comments are lost; a symbolic link is kept. Raises ParameterError if the old file is unreadable,
-    and OSError if the new file cannot be written.
+    Comments are lost; a symbolic link is kept. Raises ParameterError for an unreadable file, and
+    OSError if writing fails.
     """
     content = {**_read(path), **values}
     write_whole(

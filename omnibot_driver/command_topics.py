@@ -32,9 +32,7 @@ def obeying(
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: returns True if the age of a message does not matter.
     * ``is_stop``: returns True for a command to stop, which is passed on at any age.
-    * ``ends_goal``: called with a refused message; returns True if this message must still end the
-      drive to a goal. May raise CommandRefused.
-    * ``moves_base``: whether the topic commands the motion of the base.
+    * ``ends_goal``: returns True if a refused message must still end the drive to a goal.
     """
     transit = Transit()
 

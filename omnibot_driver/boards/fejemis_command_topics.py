@@ -44,9 +44,8 @@ After the calibration, the board subtracts the bias itself. The driver must not 
 class FejemisCommands:
     """The services and topics for commands that only a Fejemis has.
 
-    * ``values``: the parameter values. The owner replaces them when the user sets a parameter.
-    * ``publish``: for each type of reading, the function that handles such a reading. The only type
-      is JobDone: its function answers the service that has requested the job.
+    * ``values``: the parameter values, which the owner replaces when the user sets a parameter.
+    * ``publish``: for each type of reading, the function that handles such a reading.
     """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
@@ -144,11 +143,10 @@ class FejemisCommands:
             self._warn(trouble)
 
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
-        """Call ``action``, and return an empty string, the reason for a refusal, or a warning.
+        """Call ``action``; return an empty string, the reason for a refusal, or a warning.
 
-        ``off``: whether ``action`` switches a device off. Such an action is refused only in a
-        replay. If a port is closed, the method still calls the action, and returns a warning that
-        the device may still be on.
+        ``off``: whether ``action`` switches a device off, which only a replay refuses. The warning
+        says that this device may still be on.
         """
 
         def say(session: Session, now: float) -> str:

@@ -12,18 +12,17 @@ from typing import Final
 ENDS_S: Final = range(56, 59)
 """Seconds of a minute, 56 to 58, in which the driver sends TIME with the next full minute.
 
-TIME sets the controller's clock. TIME comes up to 4 s before the next minute begins, so the clock
-is then up to 4 s fast.
+The controller's clock is then up to 4 s fast.
 """
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
-    """Return month, day, year, hour, minute and second (UTC) for the command TIME, or None.
+    """Return the six UTC fields of the command TIME, or None.
 
     ``now_s``: present time in s since 1970.
 
-    ``may_set_back``: whether TIME may set the controller's clock back. If not, the result is None
-    except at the end of a minute (``ENDS_S``): TIME then sets the clock to the next full minute.
+    ``may_set_back``: whether TIME may set the clock back. If not, the result is None outside the
+    seconds ``ENDS_S``.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

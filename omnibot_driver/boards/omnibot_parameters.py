@@ -143,8 +143,7 @@ OMNIBOT: Final = (
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if goal poses are used, but the axis signs do not permit them.
 
-    The sign of yaw must be the product of the signs of x and y; otherwise, the board's axes are a
-    mirror image of the robot's axes.
+    With such signs, the board's axes are a mirror image of the robot's axes.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

@@ -75,8 +75,7 @@ class ReadingClock(Protocol):
         """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
         * ``now``: time that was passed to that call.
-        * ``edge``: place in the stream of IMU samples at which the read ended (``Board.edge`` after
-          that call), or None.
+        * ``edge``: value of ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
@@ -206,8 +205,8 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that are due because time has passed. Called at ``wake_at``.
 
-        OdometryReadings, NoticeReadings and results of requests do not show that the board is
-        alive. After any other reading, the driver regards the board as alive.
+        All except OdometryReadings, NoticeReadings and results of requests show that the board is
+        alive.
         """
         return []
 
@@ -289,9 +288,8 @@ class Board(Protocol):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return the packets that the guard sends if this process hangs, in two versions.
 
-        The first version, for a released e-stop, contains Stop. The second, for a latched e-stop,
-        contains the emergency stop, then Stop. The driver calls this method after each input and
-        before each output.
+        The first version is for a released e-stop, the second for a latched one. Called after each
+        input and before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -24,9 +24,9 @@ NO_VALID_DATA: Final = "no valid data from the board; check its power and cable,
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    * ``leaving``: whether the driver is shutting down and refuses everything.
+    * ``leaving``: whether the driver is shutting down.
     * ``missing``: which lines are not open, as a sentence; empty if none.
-    * ``obeys``: False if the session replays a recording, which cannot obey.
+    * ``obeys``: False if the session replays a recording.
     """
 
     def __init__(
@@ -51,8 +51,8 @@ class Interlocks:
     def why_not_write(self) -> str:
         """Return the reason why a request is refused; empty if it is allowed.
 
-        This method is for requests that no data from the board can confirm. They are also refused
-        in a replay, which writes nothing to a board.
+        Call this method for requests that no data from the board can confirm. A replay refuses them
+        too.
         """
         replay = "" if self.obeys else f"{REPLAY}; start the driver on the board's port"
         return self.why_not_request() or replay

@@ -18,10 +18,9 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 class SpeedLimits:
     """The largest speeds and accelerations that are commanded.
 
-    * ``linear_mps``: length of the linear velocity, in m/s.
-    * ``angular_radps``: yaw rate, in rad/s.
-    * ``wheel_radps``: rate of the fastest wheel, in rad/s.
-    * ``linear_mps2``, ``angular_radps2``: accelerations in m/s² and rad/s²; 0: unlimited.
+    * ``linear_mps``: length of the linear velocity.
+    * ``wheel_radps``: rate of the fastest wheel.
+    * ``linear_mps2``, ``angular_radps2``: accelerations; 0: unlimited.
     """
 
     linear_mps: float = 0.5

@@ -57,8 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        If the motion monitor has stopped the robot twice within 60 s, and the board has no ~/start,
-        the release ends the refusal of motion. In all other cases, the release changes nothing.
+        If the board has no ~/start, the release ends a refusal after the motion monitor's second
+        stop within 60 s.
         """
         if self.until is Until.ESTOP:
             self.start()
@@ -74,19 +74,17 @@ class MotionInterlock:
     def be_active(self, now: float, timeout_s: float, *, stalled_s: float = 0.0) -> None:
         """Restart the time without commands, ``timeout_s`` (s), after which a refusal ends.
 
-        Call this method after a refused command, and after a stall of ``stalled_s`` (s), because
-        commands may have arrived unnoticed during the stall. A refusal whose time was over before
-        the stall ends at once. A refusal after the motion monitor's second stop within 60 s has no
-        such time.
+        Call this method after a refused command, and after a stall of ``stalled_s`` (s).
         """
+        # A refusal whose time was over before the stall has ended. During the stall, commands may
+        # have arrived unnoticed.
         self.expire(now - stalled_s, timeout_s)
         self._commanded_at = now
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
-        """Record a command, and return the reason why it is refused; empty if it is allowed.
+        """Record a command, and return why it is refused; empty if it is allowed.
 
-        * ``timeout_s``: time in s. If no command comes for this time, a refusal after the motion
-          monitor's first stop ends.
+        * ``timeout_s``: time in s without commands after which a refusal can end.
         * ``stands``: whether the command is a standstill, which is always allowed.
         """
         reason = "" if stands else self.reason(now, timeout_s)

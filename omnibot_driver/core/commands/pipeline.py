@@ -40,7 +40,6 @@ class CommandPipeline:
     """The path of motion commands in one session.
 
     * ``policy``: the command in effect, its expiry and the e-stop latch.
-    * ``interlock``: refuses motion after the motion monitor has stopped the robot.
     * ``monitored``: whether the motion monitor is enabled.
     * ``obeys``: False for a recording.
     """
@@ -100,8 +99,8 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        The robot is stopped if the encoding fails. It is also stopped if the new settings turn a
-        standstill into a motion, because this motion has not been checked.
+        The robot is stopped if the encoding fails, or if the settings turn a standstill into a
+        motion.
         """
         current = self.policy.current
         if current is None:
@@ -115,6 +114,7 @@ class CommandPipeline:
                 f"robot stopped: the current command does not fit the new settings ({error}); send"
                 " another command"
             ]
+        # This motion has not been checked.
         if stood and not current.is_zero:
             self.policy.halt(now)
         return []
@@ -256,9 +256,8 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        If the robot was driving to a goal, a notice says that the goal is discarded. Any other
-        motion command needs no notice here: its sender repeats the command, and the driver then
-        reports the refusal.
+        Only a discarded goal needs a notice. For other motions, the driver reports the refusal of
+        the next command.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)

@@ -52,8 +52,8 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     * ``proof``: object to which each sent stop and each sent motion is reported.
-    * ``heard``: function that is called with the packets and the time of each write. The packets of
-      requests are included.
+    * ``heard``: function that is called with the packets and the time of each write, also for
+      requests.
     """
 
     def __init__(
@@ -104,9 +104,7 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written.
 
-        If a motion command is in effect, its set-point is sent again at once, for two reasons. The
-        packets may contain Stop, which has stopped the robot. Or the board may have received only a
-        part of a motion frame, and have taken bytes of the packets as the missing part.
+        If a motion command is in effect, its set-point is then sent again at once.
         """
         if self._heard is not None:
             self._heard(packets, now)
@@ -118,6 +116,8 @@ class SetpointStream:
             self._note_stop(now)
             if self._standing is not EMERGENCY_STOP:
                 self._urgent = False
+        # The packets may contain Stop, which has stopped the robot. Or the board may have received
+        # only a part of a motion frame, and have taken bytes of the packets as the missing part.
         if self._motion is not None and not (stops and self._motion.is_zero):
             self._said_at = -math.inf
 

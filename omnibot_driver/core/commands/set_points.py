@@ -67,12 +67,9 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * The attribute ``is_zero``: whether the command is a standstill.
-    * The constructor's argument ``is_zero``: a function that returns whether an order is a
-      standstill. The function may raise CommandRefused.
-    * ``before``: previous set-point. The ramp starts at the velocity that ``before`` has reached,
-      or at rest if ``before`` is not a body velocity.
-    * ``since``: earliest time, in s, at which a ramp can begin.
+    * ``is_zero`` (argument): returns whether an order is a standstill; may raise CommandRefused.
+    * ``before``: previous set-point, at whose velocity the ramp starts.
+    * ``since``: earliest start of a ramp, in s.
     """
 
     authority: Final = Authority.BASE
@@ -145,16 +142,10 @@ class SteadySetpoint:
 class GoalSetpoint:
     """A pose to drive to.
 
-    * ``goal``, ``place``: the pose to drive to, in the odometry frame and in the board's earth
-      frame.
-    * ``alignment``: ``Odometry.alignments`` at the time of the command; after a change, the goal is
-      discarded.
+    * ``goal``, ``place``: this pose, in the odometry frame and in the board's earth frame.
+    * ``alignment``: ``Odometry.alignments`` at the time of the command; a change discards the goal.
     * ``check``: raises CommandRefused if an order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
-    * ``before``: the previous command, or None. ``is_left_by`` compares the robot's pose with the
-      smallest distance and angle to the goal so far. If ``before`` is a goal, the new goal takes
-      over these two values, plus the distance and angle between the two goals. So a repetition of
-      the goal changes nothing.
     """
 
     authority: Final = Authority.POSE
@@ -176,6 +167,8 @@ class GoalSetpoint:
         self._goal, self._check = goal, check
         self._order = self.final = GoTo(place)
         self._nearest_m = self._nearest_rad = math.inf
+        # ``is_left_by`` compares the robot's pose with the smallest distance and angle to the goal
+        # so far. A repetition of the goal must not change these two values.
         if isinstance(before, GoalSetpoint):
             apart = before._goal.way_to(goal)
             self._nearest_m = before._nearest_m + apart.way_m

@@ -31,15 +31,13 @@ A single displacement could be damaged, or come from the time before the wheels 
 PROOFS: Final = 2.0
 """Factor for the time after which the driver stops waiting for a proof of a stop.
 
-This time is the factor times the duration of the standstill that proves a stop (``still_s`` minus
-``SLACK_S``). If displacements are rare, the driver waits longer.
+The factor multiplies the duration of the standstill that proves a stop. If displacements are rare,
+the driver waits longer.
 """
 RAREST_S: Final = 1.0
 """Upper limit, in s, for the assumed period of displacements.
 
-The driver takes the duration of the last displacement as the period. After lost displacements, this
-duration is too long, because it also covers the time of the lost ones. So a longer duration is
-replaced by this limit.
+The driver takes the period from the last displacement, whose duration may also cover lost ones.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
@@ -49,9 +47,8 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether the robot is known to stand still, because the board paused, or the robot
-      stood still for ``still_s`` after Stop. A commanded or measured motion ends the proof.
-    * ``owed``: whether a motion command was sent, and no standstill has been proved since then.
+    * ``proved``: whether the robot is known to stand still.
+    * ``owed``: whether a motion command was sent, and no standstill has been proved since.
     * ``measured``: whether a displacement arrived later than ``UNDER_WAY_S`` after Stop.
     """
 
