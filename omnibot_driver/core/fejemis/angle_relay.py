@@ -22,7 +22,7 @@ LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit, in degrees, for the angle to the left that the board may read by mistake.
 
-If the minus sign of an angle to the right is lost unnoticed, the board reads an angle to the left.
+The mistake is an unnoticed loss of the minus sign of an angle to the right.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

@@ -89,8 +89,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        True if this angle limits the speed. Also True without checksums: the board may obey a
-        damaged line until the next line.
+        True if this angle limits the speed, or if the lines have no checksums, so that damage may
+        be unnoticed.
         """
         return self.held or not self._pair.with_sums
 

@@ -13,8 +13,8 @@ VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
 """Limits for the number of lines, among 24 of one kind, that differ from the learnt form.
 
-At the limit, the driver accepts every form of this kind of line. ``VARIES`` is for lines with a
-correct checksum.
+At the limit, the driver accepts every form of this kind of line. ``VARIES`` is for correct
+checksums.
 """
 OF: Final = 24
 

@@ -56,10 +56,9 @@ AGAIN_RAD: Final = 0.012
 With them, the driver detects that the board has set its pose to zero between two rejected poses.
 """
 LONGEST_JUMP_S: Final = 0.2
-"""Longest time, in s, for which the driver trusts the wheel speeds more than the poses.
+"""Longest time after an accepted pose, in s, in which the wheel speeds overrule the poses.
 
-The time begins with the last accepted pose. Later poses may be wrong: another program may
-repeatedly set the pose to zero (``enc0``).
+Another program may repeatedly set the pose to zero (``enc0``).
 """
 
 

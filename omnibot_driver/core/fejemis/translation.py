@@ -151,8 +151,7 @@ class Translation:
     def settle(self, clock: TeensyClock, now: float) -> None:
         """Add waiting IMU samples and orientations to the readings until a sample is doubtful.
 
-        A doubtful sample waits for the next pose. Call this method after a pose and at the end of a
-        read.
+        Call this method after a pose and at the end of a read.
         """
         for item in self._pairs.take():
             if isinstance(item, Pair):
