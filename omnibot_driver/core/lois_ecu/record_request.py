@@ -83,12 +83,10 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings ``found``, with the result of the request if it is known now.
+        """Return ``found`` with the result of the request, if known, and without other records.
 
-        A record that was not requested is removed from the readings. If no readings are left to
-        return, and lines of a record are arriving, the method returns a RecordComes.
-
-        ``prevented``: why the board cannot send the record, as a sentence; empty if it can.
+        While a record arrives, an empty list becomes a RecordComes. ``prevented``: why the board
+        cannot send the record, as a sentence; empty if it can.
         """
         comes: list[LoisReading] = [RecordComes()] if decoder.in_record else []
         if self.kind is None:

@@ -24,8 +24,7 @@ After a boot, the report period is 0.4 s, so one unchanged report is enough.
 class RepeatedReset:
     """A reset of the board with which ``ecu`` converses. It is sent at most ``RESETS`` times.
 
-    * ``left``: how many times the reset can still be sent. The method ``begin`` sets this number to
-      ``RESETS``, and ``plan`` reduces it after each sending.
+    * ``left``: how many times the reset can still be sent.
     * ``again_at_s``: time in s at which to call ``again``; infinity if no repetition is planned.
     """
 

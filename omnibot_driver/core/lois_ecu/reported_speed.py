@@ -28,9 +28,9 @@ LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, from one reported
-speed to the next, in ``duration`` s. After a larger change, the speed is rejected: the board has
-noticed a tick late, and so has measured a wrong speed."""
+"""``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, between two reported
+speeds that are ``duration`` s apart. After a larger change, the speed is rejected: the board has
+noticed a tick late."""
 FIRST_RPM: Final = 8.0
 FIRST_PART: Final = 2.0
 """``FIRST_RPM + FIRST_PART * expected``: largest plausible first speed of a starting wheel, in RPM.
@@ -108,9 +108,8 @@ class ReportedSpeed:
     def judge(self, speed_mps: float, duration_s: float) -> None:
         """Decide whether a reported speed is plausible. Call this before ``take``.
 
-        If the previous speed was rejected, and the board now reports a different speed, the wheel
-        has ticked again. The board has then measured anew, so the new speed is accepted without a
-        check.
+        After a rejected speed, a different speed is accepted without a check, because the board has
+        measured anew.
         """
         motion, before_mps, misled = self._motion, self._rejected_mps, self._false
         self._rejected_mps, self._false, self.misleads = None, False, misled
@@ -218,10 +217,8 @@ class ReportedSpeed:
     def _doubt_rolling(self, chance: float) -> None:
         """Make the distance of a wheel less certain, because the wheel may be at rest.
 
-        In total, the added standard deviation is ``chance`` times the estimated distance since the
-        reported speed last changed. The board's odometry (0x20) cannot correct this error.
-
-        ``chance``: probability that the wheel is at rest.
+        ``chance``: probability that the wheel is at rest. The board's odometry (0x20) cannot
+        correct this error.
         """
         wrong_m = chance * abs(self._motion.way_m(self._index) - self._wheel.rolled_to_m)
         if wrong_m > self._doubted_m:

@@ -21,9 +21,8 @@ JUMP_TICKS: Final = 3
 zero that proves a reset. No wheel can roll as far between a reset and the next counts."""
 STEADY_TURNS: Final = 1 / 60
 STEADY_TICKS: Final = 2
-"""``STEADY_TURNS`` (turns of a wheel) plus ``STEADY_TICKS`` (ticks): smallest count of a wheel at
-rest from which a fall to zero proves a reset. The new count of the other wheel must be zero too.
-Backlash changes a count by less than this limit."""
+"""``STEADY_TURNS`` (turns of a wheel) plus ``STEADY_TICKS`` (ticks): smallest count at rest from
+which a fall of both counts to zero proves a reset. Backlash changes a count by less."""
 UNPROVED_S: Final = 2.5
 """Time in s after which the driver accepts counts near zero without a proof. No proof is possible
 if the counts were already near zero before the reset."""
@@ -35,8 +34,6 @@ class ResetProof:
     ``before``: the counts when the reset was sent; None if they are unknown.
 
     ``steady``: whether ``before`` had not changed for some time, so that the wheels were at rest.
-
-    ``ticks_per_revolution``: encoder ticks for one turn of a wheel. It may be changed at any time.
     """
 
     def __init__(self, before: Ticks | None, ticks_per_revolution: int, *, steady: bool) -> None:
@@ -48,9 +45,8 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the driver sends the reset again.
 
-        ``before``: the last tick counts before this repetition. These counts replace the earlier
-        ones if the wheels are at rest (``steady``), and one count is large enough for a proof (see
-        ``STEADY_TICKS``).
+        ``before``: the last tick counts. They replace the earlier ones only if the wheels are at
+        rest (``steady``), and one count is large enough for a proof.
         """
         if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady

@@ -29,9 +29,8 @@ REPORT_S: Final = 0.2
 by at most ``REPORT_S`` for each report that arrives, so that earlier speeds are not forgotten too
 soon."""
 HIDDEN_PART: Final = 0.3
-"""Rate of this module's clock while the board does not report the wheel's speed, as a fraction of
-real time. The clock decides when an earlier speed is forgotten, so a slow clock keeps earlier
-speeds for longer."""
+"""Rate of this module's clock, as a fraction of real time, while the board does not report the
+wheel's speed. A slower clock keeps earlier speeds for longer."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -40,24 +39,10 @@ FASTER: Final[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 1.0)
 FELL_IN_GAPS: Final[tuple[float, ...]] = (0.0, 0.6, 0.8, 0.9, 1.0)
 GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1.0)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that a wheel is at rest while the board repeats the wheel's reported speed.
+"""Probabilities that a wheel is at rest, by the number of repetitions of its reported speed.
 
-Each constant begins with the probability for a new speed. The next values are for a speed that was
-repeated once, twice, and so on; the last value is also for all further repetitions. The values of
-``FASTER`` are assumed; those of the other constants were counted on the public firmware.
-
-The last change of the reported speed decides which constant applies. A *fall* is a decrease by at
-least ``FELL_RPM``:
-
-* ``FAST``: after a fall to a speed above ``FAST_RPM``.
-* ``FAR``: after a fall by at least ``FELL_FAR_RPM``.
-* ``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
-* ``NEAR``: after a fall by less than ``FELL_FAR_RPM``.
-* ``FELL_IN_GAPS``: instead of ``LONE`` and ``NEAR``, while reports are lost.
-* ``GAPS``: while reports are lost, without a reported fall.
-* ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. The wheel rolls
-  on, unless a late tick has made the speed wrong.
-* ``TUNED``: after any fall to a speed below ``FASTEST_RPM``, if the user set the gains.
+The last value is also for all further repetitions. The values of ``FASTER`` are assumed; the others
+were counted on the public firmware.
 """
 
 
@@ -134,6 +119,7 @@ class RestingWheel:
 
         The index is the number of times that the last reported speed has been repeated.
         """
+        # A wheel at such a speed rolls on, unless a late tick has made the speed wrong.
         if rpm >= FASTEST_RPM:
             return FASTER if self._fell_rpm >= FELL_FAR_RPM else ()
         if rpm <= SLOWEST_RPM:

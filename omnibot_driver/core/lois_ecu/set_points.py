@@ -31,8 +31,7 @@ class SetPoints:
 
     * ``saturated``: number of commands that were slowed, because a value was above its limit.
     * ``stopped_at_s``: time of the first zero set-point after the last motion command; infinity if
-      none was sent. RPM 0/0, which clears the firmware's measured speed, is due at least
-      ``CLEAR_AFTER_S`` later. To repeat RPM 0/0, ``clears`` sets ``stopped_at_s`` to a later time.
+      none was sent. To repeat RPM 0/0, ``clears`` sets a later time.
     * ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
     * ``moved_at_s``: time of the last motion command.
     * ``said_at_s``: time of the last set-point, also of a zero one.

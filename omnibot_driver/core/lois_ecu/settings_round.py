@@ -23,9 +23,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 ROUNDS: Final = 5
 FAST_TICKS_MS: Final = 200
-"""Longest period of the tick reports, in ms, that each of the first ``ROUNDS`` rounds of settings
-writes. Fewer rounds write a longer period: each write restarts the period on the board, so too many
-writes could delay the next tick report by 1 s or more."""
+"""Longest period of the tick reports, in ms, that each settings round writes. Fewer rounds write a
+longer period, because each write restarts the period on the board."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the setting LEFT_SHORT_CORRECTION in the public firmware after a boot."""
 
@@ -33,8 +32,7 @@ BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 def slow_ticks(settings: LoisEcuSettings) -> bool:
     """Return whether the tick reports' period is too long to be written in each settings round.
 
-    Each write restarts the period on the board. If each of five rounds wrote a long period, the
-    board might send no tick report for 1 s or more.
+    Each write restarts the period on the board, and so delays the next tick report.
     """
     return settings.periods_ms.get(Stream.TICKS, 0) > FAST_TICKS_MS
 
@@ -66,19 +64,17 @@ def round_commands(
 ) -> list[Command]:
     """Return the commands of a round of settings, in an order that changes from round to round.
 
-    The board cannot receive while it sends reports. If the order were constant, the board could
-    miss the same line in each round.
-
-    The request for a date comes last: the board answers at once, and would miss the next line.
-
     * ``number``: number of the round, from 1.
     * ``ticks``: whether the round writes the period of the tick reports.
     * ``correction``: whether the setting LEFT_SHORT_CORRECTION may have been overwritten.
     * ``date``: whether the round requests a date.
     """
     rest = list(_writes(settings, ticks=ticks, correction=correction))
+    # The board cannot receive while it sends reports. With a constant order, it could miss the same
+    # line in each round.
     place = number * len(rest) // ROUNDS % len(rest)
     after, before = _repeating(rest[place:], settings), _repeating(rest[:place], settings)
+    # This request comes last: the board answers at once, and would miss the next line.
     asked = [SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)] if date else []
     if settings.with_sum:
         return [*after, *before, *asked]

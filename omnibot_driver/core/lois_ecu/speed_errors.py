@@ -23,11 +23,12 @@ ROUNDED_STDDEV: Final = 0.15
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""Standard deviation that is added to a wheel's excess when its set-point changes.
+"""The excess: the fraction by which a wheel that rolls backward is faster than its set-point.
 
-The *excess* is the fraction by which a wheel that rolls backward is faster than its set-point.
-``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess. In each of the three
-constants, the first value is for the board's own controller gains, the second for the user's gains.
+* ``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of the excess.
+* ``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
+
+The first value is for the board's own controller gains, the second for the user's gains.
 """
 DUTY_STDDEV: Final = 0.3
 
@@ -35,9 +36,8 @@ DUTY_STDDEV: Final = 0.3
 class SpeedErrors:
     """Errors of the wheels' speeds in the motion filter ``motion``: a bias and an excess per wheel.
 
-    In duty mode, a bias is a relative error. In other modes, a bias is the amount in m/s by which
-    the firmware rounds down a speed. An excess is the fraction by which a wheel that rolls backward
-    is faster than its set-point.
+    A bias is relative in duty mode, otherwise in m/s. An excess is the relative error of a backward
+    speed.
     """
 
     def __init__(self, motion: "MotionFilter") -> None:
@@ -48,8 +48,8 @@ class SpeedErrors:
     def restored(self) -> None:
         """Record that the filter has gone back to an earlier state.
 
-        If a wheel follows a duty command, the earlier state may contain the speed errors of RPM
-        set-points. So the next call of ``follow`` resets the speed errors of both wheels.
+        That state may contain the errors of RPM set-points. So if a wheel follows a duty command,
+        the next ``follow`` resets the errors of both wheels.
         """
         if self._kinds and "duty" in self._kinds:
             self._kinds = None
@@ -57,9 +57,8 @@ class SpeedErrors:
     def follow(self) -> None:
         """Reset the bias of each wheel whose kind of command has changed.
 
-        If at least one kind has changed, also reset the excess (relative error of a backward speed)
-        of both wheels. A Stop after a duty command does not change the kind, because such a Stop
-        does not change the error of the speed.
+        A change also resets the excess of both wheels. A Stop after a duty command changes neither
+        the kind nor the speed's error.
         """
         before = self._kinds or ("", "")
         left, right = [

@@ -30,24 +30,21 @@ TOO_FAST_RPM: Final = 3
 """A repeated speed is outdated, and the wheel is at rest, if the speed is more than ``TOO_FAST``
 times the set-point, and more than ``TOO_FAST_RPM`` RPM above it."""
 UNLIKE: Final = 1.15
-"""Largest usual ratio between the *relative speeds* of two wheels that roll backward. The relative
-speed of a wheel is its speed divided by its set-point. A wheel's speed is regarded as too high only
-if its relative speed is more than ``UNLIKE`` times that of the other wheel."""
+"""Largest usual ratio between the *relative speeds* (speed divided by set-point) of two wheels that
+roll backward. Up to this ratio, a wheel's speed is not regarded as too high."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 AT_LEAST_BACKWARD: Final = 8
-"""``AT_LEAST``, ``AT_LEAST_BACKWARD``: smallest number of reports without motion that show a
-stalled wheel, after a forward or a backward command. While a wheel rolls steadily backward, the
-board can report the same speed a few times, and the driver may see no motion in these reports."""
+"""Smallest number of reports without motion that show a stalled wheel. ``AT_LEAST`` is for a
+forward command. A backward command needs more: the board may repeat the speed of a rolling
+wheel."""
 
 
 class StallWatch:
     """Detector of stalled wheels. ``stalled`` reports a stalled wheel once in each ``STALLED_S``.
 
-    ``settings`` may be replaced at any time.
-
-    ``may_roll``: for each wheel, whether it may roll although it seems to be stalled. This is so if
-    the board keeps reporting a speed that is too high for a wheel at rest.
+    ``may_roll``: for each wheel, whether it may roll although it seems stalled. The board then
+    repeats a speed too high for a wheel at rest.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -111,9 +108,7 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return, for each wheel, whether it is commanded but has not turned for ``STALLED_S``.
 
-        The result is True only after at least ``AT_LEAST`` reports without motion, or after at
-        least ``AT_LEAST_BACKWARD`` reports in a backward drive. If the result is True for a wheel,
-        the times and the numbers of reports of both wheels begin again from zero.
+        If the result is True for a wheel, the times and report counts of both wheels begin again.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)

@@ -23,9 +23,8 @@ STILL_TALKS_S: Final = 0.3
 class ModeChange:
     """Brings the board into the requested terminal mode, ``wanted``.
 
-    ``want`` requests a mode; ``stop_first`` announces the change of a parameter. The driver stops
-    the robot before such a change, and before the board enters a sensor's mode. ``want`` and
-    ``stop_first`` may be called at any time.
+    ``want`` requests a mode; ``stop_first`` announces the change of a parameter. Both may be called
+    at any time.
     """
 
     def __init__(self) -> None:
@@ -111,14 +110,6 @@ class ModeChange:
     def stops(self, now: float, *, stands: bool, cleared: bool) -> SetDuty | SetRpm | None:
         """Return the command to send now to stop the robot, or None if no stop is needed.
 
-        Before some changes of a mode or a parameter (see ``stop_first``), two commands stop the
-        robot:
-
-        * First: Stop, until the robot is at rest, but at most for ``UNPROVED_S``.
-        * Then: RPM 0/0, until ``cleared``. RPM 0/0 clears the RPM target. While the target is
-          positive, the public firmware counts the ticks of a wheel as forward motion, even if a
-          duty drives the wheel backward.
-
         ``stands``: whether the robot is seen at rest.
 
         ``cleared``: whether RPM 0/0 was sent often enough.
@@ -133,6 +124,9 @@ class ModeChange:
                 self._stopping.clear()
                 self._again_at_s = -math.inf
                 return None
+            # RPM 0/0 clears the RPM target. While the target is positive, the public firmware
+            # counts the ticks of a wheel as forward motion, even if a duty drives the wheel
+            # backward.
             command = outbound.EMERGENCY_STOP
         self._again_at_s = now + 0.05
         return command

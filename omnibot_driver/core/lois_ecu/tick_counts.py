@@ -30,38 +30,29 @@ The decrease is ``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration`` turns, pl
 ``RESTARTED_TICKS`` ticks.
 """
 SILENT_S: Final = 1.0
-"""Limit in s for a time without tick reports.
-
-After a longer time, counts near zero prove a restart of the board if the board's clock deviates
-from the fitted clock. After a shorter time, the wheels may have rolled back to such counts. A
-restart is then proved only if the expected motion also excludes the counts.
-"""
+"""Time in s without tick reports after which counts near zero, and a clock that deviates from the
+fitted clock, prove a restart of the board. After a shorter time, the expected motion must also
+exclude the counts."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s in which wheels are assumed to roll back between two tick reports.
-
-The limit applies only if the unit of the board's clock was known before the second report, and is
-unknown after it. Otherwise, the wheels may roll back in the whole time between the reports.
-"""
+"""Longest time in s in which wheels are assumed to roll back between two tick reports. The limit
+applies only if the unit of the board's clock was known before the second report, and is unknown
+after it."""
 IN_FLIGHT_S: Final = 0.5
-"""Time in s for which received counts may still be from before a reset.
-
-The time begins with the first counts that arrive after the driver has sent the reset. In this time,
-counts can arrive that the board sent before it received the reset, or that are read late.
-"""
+"""Time in s for which received counts may still be from before a reset. The time begins with the
+first counts that arrive after the driver has sent the reset."""
 
 
 class TickCounts:
     """The tick counts of one board, over all connections.
 
-    * ``last``: the last received counts; None until the first ones of a connection.
-    * ``came_at_s``: time of the last counts, in s. ``changed_at_s``: time of the last counts that
-      had changed, in s.
-    * ``unit``: unit of the board's clock; None if it was never known in this connection.
+    * ``last``: the last counts; None before the first ones of a connection or after a reset.
+    * ``came_at_s``: time of the last counts, in s.
+    * ``changed_at_s``: time of the last counts that had changed, in s.
+    * ``unit``: unit of the board's clock; None if it is not known yet.
     * ``time``: the board's clock against the time of arrival.
     * ``restarts``: number of restarts of the board that the driver has noticed.
-    * ``ticks_per_revolution``: number of ticks of one turn of a wheel.
     """
 
     def __init__(self, odometry: LoisOdometry, ticks_per_revolution: int) -> None:
@@ -96,8 +87,6 @@ class TickCounts:
 
     def was_reset(self, ticks: Ticks, read_s: float) -> bool:
         """Return whether the board may have obeyed a reset since the last report of ticks.
-
-        True if a reset was sent, and a count is nearer to zero than in the last report.
 
         ``read_s``: time of the read in s, without a correction for a late read.
         """
@@ -158,32 +147,22 @@ class TickCounts:
 
         ``fallen``: decrease, in ticks, of the count that has decreased more. ``duration_s``: time
         in s since the previous report.
-
-        The result is False in two cases:
-
-        * A new count is larger than the number of ticks that a wheel can roll in ``duration_s``.
-        * The expected motion explains the new counts, and a wheel can roll back by ``fallen`` ticks
-          in ``duration_s``. The driver checks this only if the board's clock counts ns, the board
-          counts the ticks of both wheels, and ``duration_s`` is at most ``SILENT_S``.
         """
         turns = FASTEST_TURNS_PER_S * duration_s + TURNS_MARGIN
         most = turns * self.ticks_per_revolution + TICKS_MARGIN
+        # No wheel can have rolled this distance since a restart.
         if max(abs(ticks.left), abs(ticks.right)) > most:
             return False
         known = self.unit == "ns" and self._unit_known and duration_s <= SILENT_S
         if fallen > most or not (known and self._odometry.counting):
             return True
+        # The wheels may have rolled back to the new counts.
         return self._odometry.only_a_restart_explains(ticks, now, 0.0)
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return the time in s since the board's start, by the board's clock.
+        """Return the time in s since the board's start, by the board's clock, or None if unknown.
 
-        The caller assumes that the board has started since the previous report. The result is None
-        if the unit of the clock is unknown. A clock in ns wraps every 4.3 s. With such a clock, the
-        result is also None if the clock may have wrapped since the previous report, or if the clock
-        shows a longer time than ``duration_s``.
-
-        ``duration_s``: time in s since the previous report.
+        The caller assumes that the board has started since the previous report, ``duration_s`` ago.
         """
         if self.unit is None:
             return None
@@ -194,9 +173,6 @@ class TickCounts:
 
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
         """Return whether the clock and the counts prove a restart of the board.
-
-        The clock must deviate from the fitted clock, and rolling wheels must not explain the
-        counts. After more than ``SILENT_S`` without ticks, the clock alone is enough.
 
         Without a proof, this method increases the uncertainty of the odometry.
         """

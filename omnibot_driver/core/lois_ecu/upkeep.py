@@ -42,11 +42,10 @@ class Upkeep:
         self.heard_at_s = self._recovered_at_s = -math.inf
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Use new settings. Changed settings are written to the board.
+        """Use new settings, and write changed ones to the board.
 
-        The robot is first stopped if the drive mode changes, or if a sensor's terminal mode is
-        requested. In duty mode, it is also stopped if the duty scale changes, or if ``max_duty``
-        becomes lower.
+        The robot is first stopped for a new drive mode or a sensor's terminal mode; in duty mode,
+        also for a new duty scale or a lower ``max_duty``.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:

@@ -39,11 +39,9 @@ class _Effect:
 class WheelModel:
     """The commands of one wheel. Speeds are those of the wheel's rim.
 
-    ``kind``, ``target_mps``: the command that the motor follows now.
-
-    ``hidden_mps``: the firmware's RPM target, as a speed of the rim. A duty command does not change
-    this target, but while the duty is negative, each tick lowers the target. The firmware counts
-    ticks only while the target is positive.
+    * ``kind``, ``target_mps``: the command that the motor follows now.
+    * ``hidden_mps``: the firmware's RPM target. While a duty is negative, each tick lowers this
+      target. The firmware counts ticks only while the target is positive.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:

@@ -46,12 +46,9 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Factors in s for the distance error of a wheel that halts soon after a new set-point.
-
-Such a wheel has not yet reached the assumed speed, so it has rolled less far than assumed. The
-standard deviation of this error in m is the factor times ``unsettled_mps``. The first factor is for
-the board's own gains, the second for the user's gains.
-"""
+"""Factors in s for a wheel that halts soon after a new set-point: standard deviation of its
+distance in m, divided by ``unsettled_mps``. The first is for the board's gains, the second for the
+user's."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -82,22 +79,18 @@ class Step:
 class Wheel:
     """Properties of one wheel that are not states of the motion filter.
 
-    ``base``: index of the wheel's first state in the filter.
-
-    ``blind``: whether the wheel moved, or had a target other than zero, while the board did not
-    count its ticks. Only the caller sets it to False.
+    * ``base``: index of the wheel's first state in the filter.
+    * ``blind``: whether the wheel moved, or was to move, while the board did not count its ticks.
+      Only the caller sets it to False.
     """
 
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m that the wheel had rolled when its motion was last certain.
-
-        The motion is certain when the board measures a new speed, when the board restarts, when the
-        speed controller is reset, and when the wheel starts. If the driver notices later that the
-        wheel has not moved since that moment, it subtracts the distance added after that moment.
-        """
+        """Distance in m that the wheel had rolled when its motion was last certain. If the wheel
+        proves to have been at rest since then, the driver subtracts the distance added after that
+        moment."""
         self.begin_again()
 
     def begin_again(self) -> None:
@@ -162,25 +155,21 @@ class Wheel:
         """Return the factor by which motion of the wheel changes the tick count: 1, -1 or 0.
 
         ``signed``: whether the count decreases when the wheel rolls backward. The factor is then
-        always 1. Otherwise:
-
-        * 1: the count increases when the wheel rolls forward.
-        * -1: the wheel rolls backward, but the count increases.
-        * 0: the board does not count.
+        always 1.
         """
         if signed:
             return 1.0
         if not self.course.counting:
             return 0.0
         rolls_back = speed_mps < 0 and self.rolled_mps < 0 and self.rolled_s < ROLLED_OUT_S
+        # An unsigned count increases even while the wheel rolls backward.
         return -1.0 if rolls_back else 1.0
 
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
         """Predict the motion of the wheel in one step of the filter, and store it in ``step``.
 
-        ``holds``: whether the board keeps the last measured speed of a wheel at rest.
-
-        ``signed``: whether the count decreases when the wheel turns backward.
+        ``holds``: whether the board keeps the last measured speed of a wheel at rest. ``signed``:
+        see ``counts``.
         """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]
